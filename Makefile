@@ -1,0 +1,35 @@
+# Every target sets up .venv by itself: `make demo` and `make test` are the two commands.
+PYTHON ?= python3
+BIN := .venv/bin
+
+.PHONY: install demo test test-long lint bench clean
+
+install: .venv/installed
+
+.venv/installed: pyproject.toml core/pyproject.toml service/pyproject.toml clients/python/pyproject.toml constraints.txt
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt \
+		--editable core --editable clients/python --editable service --group dev
+	touch $@
+
+demo: install
+	$(BIN)/lineloom demo
+
+test: install
+	$(BIN)/python -m pytest
+
+test-long: install
+	$(BIN)/python -m pytest -m long
+
+lint: install
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: install
+	$(BIN)/python -m tests.benchmarks.run
+
+clean:
+	rm -rf .venv out

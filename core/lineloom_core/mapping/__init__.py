@@ -1,0 +1,1 @@
+"""From a stream of scans to poses, places and one map per site."""

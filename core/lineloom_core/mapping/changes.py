@@ -1,0 +1,30 @@
+"""What one scan changed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentMerged:
+    """`absorbed` became part of `survivor` because of the constraints named."""
+
+    survivor: str
+    absorbed: str
+    constraints: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Changes:
+    """The answer of `SiteMapper.add`.
+
+    placed: the scan has a pose. started_component: the scan opened a new component.
+    keyframe: id of the keyframe made of it. merges: components joined now. optimised: the pose
+    graph moved, so poses and lines of before are out of date.
+    """
+
+    placed: bool
+    started_component: str | None = None
+    keyframe: int | None = None
+    merges: tuple[ComponentMerged, ...] = ()
+    optimised: bool = False
