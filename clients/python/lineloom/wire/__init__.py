@@ -1,0 +1,71 @@
+"""The HTTP contract as types: what a client sends and what the service answers.
+
+Shared by both sides. Needs pydantic and msgpack only: a robot installs it without numpy.
+Requests are strict (a bool or a numeric string is not a number); answers ignore fields they do
+not know, so that an older client understands a newer service.
+"""
+
+from lineloom.wire.base import ID_PATTERN, MAX_BATCH, MAX_BEAMS, MAX_BODY_BYTES, Answer, Request
+from lineloom.wire.constraint import Constraint, ConstraintPage
+from lineloom.wire.graph import Graph, GraphEdge, GraphNode, GraphSummary
+from lineloom.wire.ingest import IngestAnswer, RejectedScan, ScanBatch
+from lineloom.wire.map import Line, MapAnswer, MapComponent
+from lineloom.wire.match import Alternative, LinePair, MatchAnswer, MatchRequest, MatchScan
+from lineloom.wire.packing import JSON, MSGPACK, pack_json, pack_msgpack
+from lineloom.wire.pose import PoseAnswer, UncertainPose
+from lineloom.wire.problem import FieldError, Problem
+from lineloom.wire.robot import MountSettings, Robot, RobotList, RobotSettings
+from lineloom.wire.scan import Odometry, Scan
+from lineloom.wire.site import Component, ScanCounts, Site, SiteList
+from lineloom.wire.status import Health, Readiness
+from lineloom.wire.trajectory import Trajectory, TrajectoryPose
+from lineloom.wire.transform import Transform
+
+__all__ = [
+    "ID_PATTERN",
+    "JSON",
+    "MAX_BATCH",
+    "MAX_BEAMS",
+    "MAX_BODY_BYTES",
+    "MSGPACK",
+    "Alternative",
+    "Answer",
+    "Component",
+    "Constraint",
+    "ConstraintPage",
+    "FieldError",
+    "Graph",
+    "GraphEdge",
+    "GraphNode",
+    "GraphSummary",
+    "Health",
+    "IngestAnswer",
+    "Line",
+    "LinePair",
+    "MapAnswer",
+    "MapComponent",
+    "MatchAnswer",
+    "MatchRequest",
+    "MatchScan",
+    "MountSettings",
+    "Odometry",
+    "PoseAnswer",
+    "Problem",
+    "Readiness",
+    "RejectedScan",
+    "Request",
+    "Robot",
+    "RobotList",
+    "RobotSettings",
+    "Scan",
+    "ScanBatch",
+    "ScanCounts",
+    "Site",
+    "SiteList",
+    "Trajectory",
+    "TrajectoryPose",
+    "Transform",
+    "UncertainPose",
+    "pack_json",
+    "pack_msgpack",
+]

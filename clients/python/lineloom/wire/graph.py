@@ -1,0 +1,51 @@
+"""The pose graph as node-link JSON: networkx reads it by `node_link_graph`."""
+
+from __future__ import annotations
+
+from lineloom.wire.base import Answer, Covariance
+
+
+class GraphSummary(Answer):
+    """Attributes of the graph as a whole."""
+
+    site: str
+    version: int
+
+
+class GraphNode(Answer):
+    """A keyframe: pose of the laser in its component's map frame."""
+
+    id: int
+    robot: str
+    component: str
+    session: str
+    seq: int
+    stamp: float
+    x: float
+    y: float
+    theta: float
+
+
+class GraphEdge(Answer):
+    """A constraint: T_source_target and its information (x, y, theta in the target's axes)."""
+
+    source: int
+    target: int
+    key: str
+    kind: str
+    state: str
+    x: float
+    y: float
+    theta: float
+    information: Covariance
+    residual: float | None = None
+
+
+class Graph(Answer):
+    """Nodes are keyframes, edges are constraints; `key` is the constraint's id."""
+
+    directed: bool = True
+    multigraph: bool = True
+    graph: GraphSummary
+    nodes: list[GraphNode]
+    edges: list[GraphEdge]

@@ -1,0 +1,49 @@
+"""A site: one floor of one building."""
+
+from __future__ import annotations
+
+from lineloom.wire.base import Answer
+
+
+class ScanCounts(Answer):
+    """accepted = durable; processed = in the map; skipped = taken, but the mapper refused it.
+
+    accepted = processed + skipped + pending.
+    """
+
+    accepted: int
+    processed: int
+    pending: int
+    skipped: int = 0
+
+
+class Component(Answer):
+    """A set of trajectory pieces whose relative poses are known."""
+
+    id: str
+    robots: list[str]
+    keyframes: int
+
+
+class Site(Answer):
+    """How a site is doing.
+
+    idle: all that was accepted is in the map, loops and merges included.
+    constraints: counts by kind and, within it, by state.
+    merged_into: id of an absorbed component -> id of its survivor.
+    """
+
+    site: str
+    version: int
+    idle: bool
+    scans: ScanCounts
+    robots: list[str]
+    components: list[Component]
+    merged_into: dict[str, str]
+    constraints: dict[str, dict[str, int]]
+
+
+class SiteList(Answer):
+    """All sites."""
+
+    sites: list[Site]
