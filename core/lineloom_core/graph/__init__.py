@@ -1,0 +1,44 @@
+"""Pose graph: constraints, which of them to believe, and the poses that fit them best."""
+
+from lineloom_core.graph.consistency import (
+    consistent_sets,
+    cycle_errors,
+    largest_consistent_set,
+    pairwise_consistent,
+)
+from lineloom_core.graph.covariance import (
+    Covariances,
+    UndeterminedError,
+    in_map_axes,
+    marginal_covariance,
+)
+from lineloom_core.graph.edge import Edge, EdgeKind, chi_squared
+from lineloom_core.graph.initialise import initialise_from_tree, rigid_join
+from lineloom_core.graph.inliers import InlierTest, select_inliers
+from lineloom_core.graph.observability import Observability, observe, project_out_weak
+from lineloom_core.graph.pose_graph import PoseGraph
+from lineloom_core.graph.solver import Solution, optimize
+
+__all__ = [
+    "Covariances",
+    "Edge",
+    "EdgeKind",
+    "InlierTest",
+    "Observability",
+    "PoseGraph",
+    "Solution",
+    "UndeterminedError",
+    "chi_squared",
+    "consistent_sets",
+    "cycle_errors",
+    "in_map_axes",
+    "initialise_from_tree",
+    "largest_consistent_set",
+    "marginal_covariance",
+    "observe",
+    "optimize",
+    "pairwise_consistent",
+    "project_out_weak",
+    "rigid_join",
+    "select_inliers",
+]

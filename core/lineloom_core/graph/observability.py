@@ -1,0 +1,107 @@
+"""Which directions a measured relative pose really fixes.
+
+Two parallel walls say nothing about the way along them, a round room nothing about its rotation.
+The information matrix knows; this file asks it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+WEAK_BELOW = 300.0
+"""Translational information [1/m^2] below which a direction is weak: sigma of 6 cm (design §7)."""
+
+WEAK_ROTATION_BELOW = 300.0
+"""Rotational information [1/rad^2] below which the angle is weak: sigma above 3.3 degrees."""
+
+_NOTHING = 1e-9  # information that is zero but for rounding
+
+
+@dataclass(frozen=True)
+class Observability:
+    """What an information matrix constrains, in the axes in which it is given.
+
+    translation: (2, 2) [1/m^2], the information on x and y when the angle is unknown (Schur
+    complement). lambda_min, lambda_max: its eigenvalues. weak_direction: angle in [0, pi) [rad] of
+    the least known direction, None where all are known well enough. weak_translation: how many of
+    the two directions are weak. rotation: information on the angle when the translation is unknown
+    [1/rad^2]. weak_rotation: too little of it.
+    """
+
+    translation: NDArray[np.float64]
+    lambda_min: float
+    lambda_max: float
+    weak_direction: float | None
+    weak_translation: int
+    rotation: float
+    weak_rotation: bool
+
+    @property
+    def full(self) -> bool:
+        """Whether all three degrees of freedom are fixed."""
+        return self.weak_translation == 0 and not self.weak_rotation
+
+
+def observe(
+    information: NDArray[np.float64],
+    weak_below: float = WEAK_BELOW,
+    weak_rotation_below: float = WEAK_ROTATION_BELOW,
+) -> Observability:
+    """Judge a (3, 3) information matrix, order x, y, theta. Raises ValueError for another shape."""
+    if information.shape != (3, 3):
+        raise ValueError("information must be 3x3")
+    translation = _without(information, np.eye(3)[2])[:2, :2]
+    values, vectors = np.linalg.eigh(translation)
+    x, y = vectors[:, 0].tolist()
+    direction = math.atan2(y, x) % math.pi
+    weak = int(np.count_nonzero(values < weak_below))
+    without_translation = information
+    for axis in np.linalg.eigh(information[:2, :2])[1].T:
+        without_translation = _without(without_translation, np.array([axis[0], axis[1], 0.0]))
+    rotation = max(float(without_translation[2, 2]), 0.0)
+    return Observability(
+        translation=translation,
+        lambda_min=max(float(values[0]), 0.0),
+        lambda_max=max(float(values[1]), 0.0),
+        weak_direction=(0.0 if direction >= math.pi else direction) if weak else None,
+        weak_translation=weak,
+        rotation=rotation,
+        weak_rotation=rotation < weak_rotation_below,
+    )
+
+
+def project_out_weak(
+    information: NDArray[np.float64],
+    weak_below: float = WEAK_BELOW,
+    weak_rotation_below: float = WEAK_ROTATION_BELOW,
+) -> NDArray[np.float64]:
+    """Return the information with what it only seems to know taken out, shape (3, 3).
+
+    A weak direction is marginalised, as if its variance were infinite: it constrains nothing, and
+    what it was correlated with keeps just what holds whatever the slide. The result is positive
+    semidefinite and singular along the weak direction.
+    """
+    judged = observe(information, weak_below, weak_rotation_below)
+    result = 0.5 * (information + information.T)
+    if judged.weak_translation:
+        vectors = np.linalg.eigh(judged.translation)[1]
+        for k in range(judged.weak_translation):
+            result = _without(result, np.array([vectors[0, k], vectors[1, k], 0.0]))
+    if judged.weak_rotation:
+        result = _without(result, np.eye(3)[2])
+    return result
+
+
+def _without(information: NDArray[np.float64], u: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Marginalise the coordinate along the unit vector u: I - I u u^T I / (u^T I u)."""
+    Iu = information @ u
+    along = float(u @ Iu)
+    if along <= _NOTHING:
+        return information  # positive semidefinite: I u is zero as well
+    reduced = information - np.outer(Iu, Iu) / along
+    result: NDArray[np.float64] = 0.5 * (reduced + reduced.T)
+    return result
