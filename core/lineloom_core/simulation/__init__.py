@@ -1,4 +1,8 @@
-"""Seeded worlds, lidars and robots: the fixture behind the tests and the demo."""
+"""Seeded worlds, lidars, robots and fleets: the fixture behind the tests and the demo.
+
+A world is walls; `FreeSpace` knows where a robot fits and draws random poses; `Planner` and `Drive`
+turn stops into motion; `SimulatedRobot` scans on its way; `Fleet` interleaves several robots.
+"""
 
 from lineloom_core.simulation.buildings import (
     corridors,
@@ -8,16 +12,34 @@ from lineloom_core.simulation.buildings import (
     world_named,
     world_names,
 )
+from lineloom_core.simulation.drive import Drive, Leg
+from lineloom_core.simulation.faults import Blockers, ScanLoss, Walkers, glazed
+from lineloom_core.simulation.fleet import Fleet
 from lineloom_core.simulation.free_space import FreeSpace
 from lineloom_core.simulation.lidar import Lidar, scanner_360, sick_lms200
+from lineloom_core.simulation.odometry import DriftingOdometry
 from lineloom_core.simulation.office import office_floor
+from lineloom_core.simulation.planner import Planner
+from lineloom_core.simulation.robot import ROBOT_RADIUS_M, SimulatedRobot, SimulatedScan
 from lineloom_core.simulation.world import World
 
 __all__ = [
+    "ROBOT_RADIUS_M",
+    "Blockers",
+    "DriftingOdometry",
+    "Drive",
+    "Fleet",
     "FreeSpace",
+    "Leg",
     "Lidar",
+    "Planner",
+    "ScanLoss",
+    "SimulatedRobot",
+    "SimulatedScan",
+    "Walkers",
     "World",
     "corridors",
+    "glazed",
     "long_corridor",
     "office_floor",
     "rectangle",
