@@ -1,0 +1,252 @@
+"""The asynchronous client."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import time
+from collections.abc import AsyncIterator, Callable, Iterable, Sequence
+from typing import Literal, Self, TypeVar
+
+import httpx
+
+from lineloom import calls
+from lineloom.calls import Box, Call, Encoding, MapFormat
+from lineloom.errors import ConnectionFailedError
+from lineloom.retry import RetryPolicy
+from lineloom.scan_like import ScanLike, batches
+from lineloom.session import DEFAULT_BATCH, BatchTotal, Session, not_idle, not_ready
+from lineloom.wire import (
+    Constraint,
+    ConstraintPage,
+    Graph,
+    IngestAnswer,
+    MapAnswer,
+    MatchAnswer,
+    MountSettings,
+    Readiness,
+    Robot,
+    RobotList,
+    Scan,
+    Site,
+    SiteList,
+    Trajectory,
+    Transform,
+)
+
+_FIRST_POLL = 0.05
+_SLOWEST_POLL = 1.0
+_T = TypeVar("_T")
+
+
+class AsyncClient:
+    """Lineloom over HTTP for asyncio; see `Client`, which has the same calls.
+
+    url: default LINELOOM_URL, else the embedded service on this machine. token: default
+    LINELOOM_TOKEN. encoding: of scans. compress: gzip bodies; None = unless the service runs on
+    this machine. transport: for tests. Raises LineloomError and nothing else on purpose: see
+    `lineloom.errors` for the tree.
+    """
+
+    def __init__(
+        self,
+        url: str | None = None,
+        *,
+        token: str | None = None,
+        encoding: Encoding = "msgpack",
+        compress: bool | None = None,
+        retry: RetryPolicy | None = None,
+        timeout: float = 30.0,
+        transport: httpx.AsyncBaseTransport | None = None,
+    ) -> None:
+        self.session = Session.build(url, token, encoding, compress, retry, timeout)
+        self._http = httpx.AsyncClient(transport=transport, **self.session.http_options())
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, *exc_info: object) -> None:
+        await self.aclose()
+
+    async def aclose(self) -> None:
+        """Close the connections."""
+        await self._http.aclose()
+
+    # Ingest
+
+    async def post_scan(self, site: str, robot: str, scan: ScanLike) -> IngestAnswer:
+        """Send one scan; when this returns, the service has it on disk."""
+        return await self.post_scans(site, robot, [scan])
+
+    async def post_scans(
+        self, site: str, robot: str, scans: Iterable[ScanLike], *, batch: int = DEFAULT_BATCH
+    ) -> IngestAnswer:
+        """Send scans of one robot in order, in batches, and return the sum of the answers.
+
+        Refused scans are listed in `rejected`, with their place in the whole list. Sending again
+        is harmless: the service knows a scan by session and seq.
+        """
+        total = BatchTotal()
+        for part in batches(scans, batch):
+            total.add(await self._post(site, robot, part), len(part))
+        return total.answer
+
+    async def set_mount(self, site: str, robot: str, mount: MountSettings) -> Robot:
+        """Say how the lidar sits on the robot; holds for the scans that follow."""
+        return await self._send(calls.put_mount(site, robot, mount))
+
+    # Query
+
+    async def sites(self) -> SiteList:
+        """Return all sites."""
+        return await self._send(calls.sites())
+
+    async def site(self, site: str) -> Site:
+        """Return how a site is doing."""
+        return await self._send(calls.site(site))
+
+    async def robots(self, site: str) -> RobotList:
+        """Return the robots of a site."""
+        return await self._send(calls.robots(site))
+
+    async def robot(self, site: str, robot: str) -> Robot:
+        """Return one robot at its latest processed scan."""
+        return await self._send(calls.robot(site, robot))
+
+    async def trajectory(self, site: str, robot: str) -> Trajectory:
+        """Return the pose of every processed scan."""
+        return await self._send(calls.trajectory(site, robot))
+
+    async def trajectory_text(
+        self, site: str, robot: str, format: Literal["tum", "csv"] = "tum"
+    ) -> str:
+        """Return the trajectory as text."""
+        return await self._send(calls.trajectory_text(site, robot, format))
+
+    async def transform(self, site: str, robot_a: str, robot_b: str) -> Transform:
+        """Return T_a_b; raises ConflictError while the two are not connected."""
+        return await self._send(calls.transform(site, robot_a, robot_b))
+
+    async def map(
+        self, site: str, *, component: str | None = None, bbox: Box | None = None
+    ) -> MapAnswer:
+        """Return the fused line map; bbox = (min x, min y, max x, max y) in the map frame."""
+        return await self._send(calls.map_lines(site, component, bbox))
+
+    async def map_file(
+        self,
+        site: str,
+        format: MapFormat,
+        *,
+        component: str | None = None,
+        bbox: Box | None = None,
+    ) -> bytes:
+        """Return the map as a file of the format named."""
+        return await self._send(calls.map_file(site, format, component, bbox))
+
+    async def graph(self, site: str) -> Graph:
+        """Return the pose graph."""
+        return await self._send(calls.graph(site))
+
+    async def graph_g2o(self, site: str) -> str:
+        """Return the pose graph as g2o text."""
+        return await self._send(calls.graph_g2o(site))
+
+    async def constraint_page(
+        self,
+        site: str,
+        *,
+        kind: str | None = None,
+        state: str | None = None,
+        limit: int | None = None,
+        cursor: str | None = None,
+    ) -> ConstraintPage:
+        """Return one page of constraints."""
+        return await self._send(calls.constraints(site, kind, state, limit, cursor))
+
+    async def constraints(
+        self, site: str, *, kind: str | None = None, state: str | None = None
+    ) -> AsyncIterator[Constraint]:
+        """Yield every constraint, page by page."""
+        cursor: str | None = None
+        while True:
+            page = await self.constraint_page(site, kind=kind, state=state, cursor=cursor)
+            for constraint in page.constraints:
+                yield constraint
+            cursor = page.next_cursor
+            if cursor is None:
+                return
+
+    async def match(self, reference: ScanLike, current: ScanLike) -> MatchAnswer:
+        """Return where `current` was taken, seen from `reference`; adds nothing to any map."""
+        return await self._send(calls.match(reference, current))
+
+    # Wait
+
+    async def ready(self) -> Readiness:
+        """Return whether scans can be taken; never tried again."""
+        return await self._send(calls.ready())
+
+    async def wait_until_ready(self, timeout: float = 60.0) -> None:
+        """Wait until the service can take scans, or raise NotIdleError."""
+        deadline = time.monotonic() + timeout
+        while True:
+            try:
+                state = await self.ready()
+                reasons = state.reasons
+                if state.ready:
+                    return
+            except ConnectionFailedError as error:
+                reasons = [error.reason]
+            if time.monotonic() >= deadline:
+                raise not_ready(self.session.url, timeout, reasons)
+            await asyncio.sleep(4.0 * _FIRST_POLL)
+
+    async def wait_until_idle(
+        self,
+        site: str,
+        timeout: float = 600.0,
+        *,
+        on_poll: Callable[[Site], object] | None = None,
+    ) -> Site:
+        """Wait until all that was accepted is in the map, loops and merges included.
+
+        Returns the site at that moment; raises NotIdleError after `timeout` seconds. on_poll is
+        given every answer on the way.
+        """
+        deadline = time.monotonic() + timeout
+        pause = _FIRST_POLL
+        while True:
+            state = await self.site(site)
+            if on_poll is not None:
+                on_poll(state)
+            if state.idle:
+                return state
+            left = deadline - time.monotonic()
+            if left <= 0.0:
+                raise not_idle(state, timeout)
+            await asyncio.sleep(min(pause, left))
+            pause = min(1.5 * pause, _SLOWEST_POLL)
+
+    async def _post(self, site: str, robot: str, part: Sequence[Scan]) -> IngestAnswer:
+        call = calls.post_scans(
+            site,
+            robot,
+            part,
+            encoding=self.session.encoding,
+            compress=self.session.compress,
+        )
+        return await self._send(call)
+
+    async def _send(self, call: Call[_T]) -> _T:
+        for attempt in itertools.count():
+            try:
+                response = await self._http.request(**self.session.request_options(call))
+            except httpx.TransportError as error:
+                await asyncio.sleep(self.session.after_failure(call, attempt, error))
+                continue
+            pause = self.session.after_answer(call, attempt, response)
+            if pause is None:
+                return call.read(response)
+            await asyncio.sleep(pause)
+        raise AssertionError("unreachable: attempts are counted without end")

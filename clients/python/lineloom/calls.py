@@ -1,0 +1,253 @@
+"""The calls of the contract without any I/O: what to send, and how to read the answer.
+
+`Client` and `AsyncClient` differ only in how they wait; everything else is here.
+"""
+
+from __future__ import annotations
+
+import gzip
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from http import HTTPStatus
+from typing import Generic, Literal, TypeVar
+from urllib.parse import quote
+
+import httpx
+from pydantic import BaseModel, ValidationError
+
+from lineloom.errors import UnexpectedAnswerError, problem_error
+from lineloom.retry import parse_retry_after
+from lineloom.scan_like import ScanLike, to_match_scan
+from lineloom.wire import (
+    JSON,
+    MSGPACK,
+    ConstraintPage,
+    Graph,
+    IngestAnswer,
+    MapAnswer,
+    MatchAnswer,
+    MatchRequest,
+    MountSettings,
+    Problem,
+    Readiness,
+    Robot,
+    RobotList,
+    RobotSettings,
+    Scan,
+    Site,
+    SiteList,
+    Trajectory,
+    Transform,
+    pack_json,
+    pack_msgpack,
+)
+
+Encoding = Literal["json", "msgpack"]
+MapFormat = Literal["json", "geojson", "svg", "png", "dxf", "nav2"]
+Box = tuple[float, float, float, float]
+
+_COMPRESS_FROM_BYTES = 1024
+_T = TypeVar("_T")
+_ModelT = TypeVar("_ModelT", bound=BaseModel)
+
+
+@dataclass(frozen=True)
+class Call(Generic[_T]):
+    """One request, and how to read its answer. retried: whether a 5xx or 429 is tried again."""
+
+    method: str
+    path: str
+    read: Callable[[httpx.Response], _T]
+    params: Mapping[str, str] = field(default_factory=dict)
+    headers: Mapping[str, str] = field(default_factory=dict)
+    content: bytes | None = None
+    retried: bool = True
+
+
+def post_scans(
+    site: str, robot: str, scans: Sequence[Scan], *, encoding: Encoding, compress: bool
+) -> Call[IngestAnswer]:
+    """POST one batch."""
+    body = pack_json(scans) if encoding == "json" else pack_msgpack(scans)
+    headers = {"Content-Type": JSON if encoding == "json" else MSGPACK}
+    if compress and len(body) >= _COMPRESS_FROM_BYTES:
+        # Level 1: a robot's processor is worth more than the last few per cent.
+        body = gzip.compress(body, compresslevel=1, mtime=0)
+        headers["Content-Encoding"] = "gzip"
+    path = f"{_robot(site, robot)}/scans"
+    return Call("POST", path, _model(IngestAnswer), headers=headers, content=body)
+
+
+def put_mount(site: str, robot: str, mount: MountSettings) -> Call[Robot]:
+    """PUT the laser's pose on the robot."""
+    body = RobotSettings(mount=mount).model_dump_json().encode()
+    return Call(
+        "PUT",
+        _robot(site, robot),
+        _model(Robot),
+        headers={"Content-Type": JSON},
+        content=body,
+    )
+
+
+def sites() -> Call[SiteList]:
+    """GET all sites."""
+    return Call("GET", "/v1/sites", _model(SiteList))
+
+
+def site(name: str) -> Call[Site]:
+    """GET how a site is doing."""
+    return Call("GET", _site(name), _model(Site))
+
+
+def robots(site: str) -> Call[RobotList]:
+    """GET the robots of a site."""
+    return Call("GET", f"{_site(site)}/robots", _model(RobotList))
+
+
+def robot(site: str, name: str) -> Call[Robot]:
+    """GET one robot."""
+    return Call("GET", _robot(site, name), _model(Robot))
+
+
+def trajectory(site: str, robot: str) -> Call[Trajectory]:
+    """GET every processed scan's pose."""
+    return Call("GET", f"{_robot(site, robot)}/trajectory", _model(Trajectory))
+
+
+def trajectory_text(site: str, robot: str, format: Literal["tum", "csv"]) -> Call[str]:
+    """GET the trajectory as text."""
+    return Call("GET", f"{_robot(site, robot)}/trajectory", _text, params={"format": format})
+
+
+def transform(site: str, robot_a: str, robot_b: str) -> Call[Transform]:
+    """GET T_a_b."""
+    path = f"{_site(site)}/transforms/{_name(robot_a)}/{_name(robot_b)}"
+    return Call("GET", path, _model(Transform))
+
+
+def map_lines(site: str, component: str | None, bbox: Box | None) -> Call[MapAnswer]:
+    """GET the fused line map."""
+    params = _map_params("json", component, bbox)
+    return Call("GET", f"{_site(site)}/map", _model(MapAnswer), params=params)
+
+
+def map_file(site: str, format: MapFormat, component: str | None, bbox: Box | None) -> Call[bytes]:
+    """GET the map as a file."""
+    params = _map_params(format, component, bbox)
+    return Call("GET", f"{_site(site)}/map", _bytes, params=params)
+
+
+def graph(site: str) -> Call[Graph]:
+    """GET the pose graph."""
+    return Call("GET", f"{_site(site)}/graph", _model(Graph))
+
+
+def graph_g2o(site: str) -> Call[str]:
+    """GET the pose graph as g2o text."""
+    return Call("GET", f"{_site(site)}/graph", _text, params={"format": "g2o"})
+
+
+def constraints(
+    site: str, kind: str | None, state: str | None, limit: int | None, cursor: str | None
+) -> Call[ConstraintPage]:
+    """GET a page of constraints."""
+    wanted = {"kind": kind, "state": state, "limit": limit, "cursor": cursor}
+    params = {name: str(value) for name, value in wanted.items() if value is not None}
+    return Call("GET", f"{_site(site)}/constraints", _model(ConstraintPage), params=params)
+
+
+def match(reference: ScanLike, current: ScanLike) -> Call[MatchAnswer]:
+    """POST two scans, to learn how they lie to each other."""
+    request = MatchRequest.model_construct(
+        reference=to_match_scan(reference), current=to_match_scan(current)
+    )
+    body = request.model_dump_json(exclude_none=True).encode()
+    headers = {"Content-Type": JSON}
+    return Call("POST", "/v1/match", _model(MatchAnswer), headers=headers, content=body)
+
+
+def ready() -> Call[Readiness]:
+    """GET whether scans can be taken. Not ready is an answer (503), not an error."""
+
+    def read(response: httpx.Response) -> Readiness:
+        if response.status_code not in (HTTPStatus.OK, HTTPStatus.SERVICE_UNAVAILABLE):
+            raise_for_problem(response)
+        try:
+            return Readiness.model_validate_json(response.content)
+        except ValidationError:
+            return Readiness(ready=False, reasons=[f"status {response.status_code}"])
+
+    return Call("GET", "/readyz", read, retried=False)
+
+
+def retry_after(response: httpx.Response) -> float | None:
+    """Return how long the service asks to wait [s], where it does."""
+    return parse_retry_after(response.headers.get("Retry-After"))
+
+
+def raise_for_problem(response: httpx.Response) -> None:
+    """Raise the ProblemError of an answer that is an error."""
+    if response.status_code < 300:
+        return
+    if response.status_code < 400:
+        where = response.headers.get("Location", "elsewhere")
+        raise UnexpectedAnswerError(f"{response.url} has moved to {where}: use that address")
+    try:
+        problem = Problem.model_validate_json(response.content)
+    except ValidationError:
+        # Not Lineloom's own words: a proxy's, most likely.
+        problem = Problem(
+            type="about:blank",
+            title=response.reason_phrase or "error",
+            status=response.status_code,
+            detail=response.text[:200].strip(),
+        )
+    raise problem_error(problem, retry_after(response))
+
+
+def _model(kind: type[_ModelT]) -> Callable[[httpx.Response], _ModelT]:
+    def read(response: httpx.Response) -> _ModelT:
+        raise_for_problem(response)
+        try:
+            return kind.model_validate_json(response.content)
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = "/".join(str(part) for part in first["loc"]) or "the whole"
+            raise UnexpectedAnswerError(
+                f"{response.url} answered with something else than the contract's "
+                f"{kind.__name__}: {where}: {first['msg']}"
+            ) from error
+
+    return read
+
+
+def _text(response: httpx.Response) -> str:
+    raise_for_problem(response)
+    return response.text
+
+
+def _bytes(response: httpx.Response) -> bytes:
+    raise_for_problem(response)
+    return response.content
+
+
+def _map_params(format: str, component: str | None, bbox: Box | None) -> dict[str, str]:
+    params = {"format": format}
+    if component is not None:
+        params["component"] = component
+    if bbox is not None:
+        params["bbox"] = ",".join(repr(float(value)) for value in bbox)
+    return params
+
+
+def _site(name: str) -> str:
+    return f"/v1/sites/{_name(name)}"
+
+
+def _robot(site: str, robot: str) -> str:
+    return f"{_site(site)}/robots/{_name(robot)}"
+
+
+def _name(name: str) -> str:
+    return quote(name, safe="")

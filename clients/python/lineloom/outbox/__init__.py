@@ -1,0 +1,6 @@
+"""A queue on disk between a robot and the network: what is put is delivered, once."""
+
+from lineloom.outbox.outbox import DeliveryFailure, Outbox
+from lineloom.outbox.queue import OnFull, OutboxStats, Refusal
+
+__all__ = ["DeliveryFailure", "OnFull", "Outbox", "OutboxStats", "Refusal"]
