@@ -49,10 +49,10 @@ class Fleet:
         people: int = 0,
         see_each_other: bool = False,
     ) -> Fleet:
-        """Send robots through a world: each through its own part and through places of others.
+        """Send robots through a world: each through its own part and along a common way.
 
         starts: T_world_base of each robot, spread at random if None. shared: share of the driving
-        spent where others go, too. people: how many walk about. see_each_other: robots block
+        spent on the way common to all. people: how many walk about. see_each_other: robots block
         beams. Raises ValueError for a start out of reach or a wrong number of starts.
         """
         rng = np.random.default_rng([seed, 3])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,8 +48,9 @@ def plan_tours(
 ) -> list[Tour]:
     """Plan one tour per robot, each at least `budget_m` metres long.
 
-    Every place belongs to the robot that starts nearest. A robot visits places of its own, then,
-    for a share `shared` of its way, the others' places nearest to where it is, then its own again.
+    A common way of `shared` * budget_m leads from place to place in the middle of all starts.
+    Every other place belongs to the robot that starts nearest. A robot first visits places of its
+    own, then drives the whole common way from its nearer end, then visits the rest of its own.
     """
     if robots < 1 or not 0.0 <= shared <= 1.0:
         raise ValueError("robots must be at least 1 and shared must lie in [0, 1]")
@@ -61,12 +63,13 @@ def plan_tours(
         raise ValueError(f"{robots} robots need as many starts, not {len(starts)}")
     points = np.vstack([[(p.x, p.y) for p in poses], spots])
     table = planner.distances(points)
-    owner = np.argmin(table[:robots, robots:], axis=0)
+    common = _common_way(table, robots, shared * budget_m)
+    spare = set(range(robots, len(points))) - set(common)
+    owner = np.argmin(table[:robots], axis=0)
     tours = []
     for robot, pose in enumerate(poses):
-        own = {robots + int(k) for k in np.flatnonzero(owner == robot)}
-        others = set(range(robots, len(points))) - own
-        order = _order(table, robot, own, others, budget_m, shared)
+        own = {k for k in spare if owner[k] == robot}
+        order = _order(table, robot, own, spare - own, common, budget_m)
         tours.append((pose.theta, points[order]))
     return tours
 
@@ -87,28 +90,58 @@ def _spread_starts(
     ]
 
 
+def _common_way(table: NDArray[np.float64], robots: int, length_m: float) -> list[int]:
+    """Return places to be visited by all, nearest next, along at least `length_m` metres.
+
+    It begins at the place whose farthest robot has the shortest way to it.
+    """
+    if length_m <= 0.0:
+        return []
+    way = [robots + int(np.argmin(np.max(table[:robots, robots:], axis=0)))]
+    left, length = set(range(robots, len(table))) - set(way), 0.0
+    while left and length < _MARGIN * length_m:
+        step = _nearest(table, way[-1], left)
+        length += float(table[way[-1], step])
+        way.append(step)
+        left.discard(step)
+    return way
+
+
+def _nearest(table: NDArray[np.float64], here: int, candidates: set[int]) -> int:
+    return min(candidates, key=lambda k: (float(table[here, k]), k))
+
+
 def _order(
     table: NDArray[np.float64],
     start: int,
     own: set[int],
     others: set[int],
+    common: list[int],
     budget_m: float,
-    shared: float,
 ) -> list[int]:
-    """Visit own, then others', then own places, always the nearest; begin anew if all are seen."""
+    """Order the places of one robot: own, the common way, own again, then everybody's, anew."""
     order, length = [start], 0.0
-    before, after = 0.5 * (1.0 - shared) * budget_m, 0.5 * (1.0 + shared) * budget_m
-    left_own, left_others = set(own), set(others)
+
+    def visit(place: int) -> None:
+        nonlocal length
+        length += float(table[order[-1], place])
+        order.append(place)
+
+    left = set(own)
+    if common:
+        first, last = common[0], common[-1]
+        of_common = sum(float(table[a, b]) for a, b in pairwise(common))
+        # As much of its own after the common way as before it, the way there counted.
+        while left and length + min(table[order[-1], [first, last]]) < 0.5 * (budget_m - of_common):
+            visit(_nearest(table, order[-1], left))
+            left.discard(order[-1])
+        forward = table[order[-1], first] <= table[order[-1], last]
+        for place in common if forward else reversed(common):
+            visit(place)
     while length < _MARGIN * budget_m:
-        if not left_own and not left_others:
-            left_own, left_others = own - {order[-1]}, others - {order[-1]}
-            if not left_own and not left_others:
-                break
-        visiting = left_others if before <= length < after else left_own
-        pool = visiting or left_others or left_own
-        step = min(pool, key=lambda k: (float(table[order[-1], k]), k))
-        length += float(table[order[-1], step])
-        order.append(step)
-        left_own.discard(step)
-        left_others.discard(step)
+        left = left or (own | others | set(common)) - {order[-1]}
+        if not left:
+            break
+        visit(_nearest(table, order[-1], left))
+        left.discard(order[-1])
     return order
