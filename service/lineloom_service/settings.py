@@ -1,0 +1,62 @@
+"""Settings: from arguments, else from the environment (`LINELOOM_*`), else these defaults."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from lineloom.wire import MAX_BATCH, MAX_BODY_BYTES
+from pydantic import Field
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+
+def _default_workers() -> int:
+    # One core stays with the API process; on two cores one worker maps and one process answers.
+    return max(1, (os.cpu_count() or 2) - 1)
+
+
+class Settings(BaseSettings):
+    """How one service runs. Times in seconds, sizes in bytes."""
+
+    model_config = SettingsConfigDict(env_prefix="LINELOOM_", extra="ignore", frozen=True)
+
+    data_dir: Path = Field(default=Path("lineloom-data"), description="Where everything is kept.")
+    host: str = "127.0.0.1"
+    port: int = Field(default=8765, ge=0, le=65535)
+    open: bool = Field(
+        default=False, description="Listen beyond loopback although no tokens protect the service."
+    )
+    log_level: str = "info"
+
+    workers: int = Field(default_factory=_default_workers, ge=1, le=64)
+    max_body_bytes: int = Field(default=MAX_BODY_BYTES, ge=1024)
+    max_batch: int = Field(default=MAX_BATCH, ge=1, le=MAX_BATCH)
+    backlog_limit: int = Field(
+        default=20_000, ge=1, description="Log entries of a site waiting to be mapped before 429."
+    )
+
+    gap_window_s: float = Field(
+        default=2.0, ge=0.0, description="How long a scan waits for those before it."
+    )
+    max_held: int = Field(
+        default=5_000, ge=1, description="Scans of one session that may wait for a gap to fill."
+    )
+
+    chunk: int = Field(default=64, ge=1, description="Log entries sent to a worker at a time.")
+    publish_every_s: float = Field(
+        default=0.5, ge=0.0, description="How often a busy worker publishes its map at most."
+    )
+    snapshot_every: int = Field(
+        default=1_000, ge=1, description="Log entries between two snapshots of a busy site."
+    )
+    snapshot_idle_s: float = Field(
+        default=5.0, ge=0.0, description="A site idle for this long is saved as well."
+    )
+    stop_grace_s: float = Field(
+        default=10.0, ge=0.0, description="Time for last snapshots when the service stops."
+    )
+
+    @property
+    def database_path(self) -> Path:
+        """The SQLite file."""
+        return self.data_dir / "lineloom.db"

@@ -1,0 +1,183 @@
+"""What can be done to the log, each as one step of a group commit.
+
+An action raises before its first write or not at all, so one refused request never spoils the
+commit that it shares with others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from sqlalchemy import delete, func, insert, select, update
+
+from lineloom_service.store import tables
+from lineloom_service.store.ledger import SiteLedger
+from lineloom_service.store.reads import read_skips
+from lineloom_service.store.records import (
+    Appended,
+    BacklogFullError,
+    NewScan,
+    Skip,
+    SnapshotRecord,
+)
+from lineloom_service.store.transaction import Transaction
+
+_PURGE_PORTION = 2_000
+_SNAPSHOTS_KEPT = 2
+
+
+def append_scans(
+    tx: Transaction,
+    site_name: str,
+    robot_name: str,
+    scans: Sequence[NewScan],
+    *,
+    processed: int,
+    limit: int,
+    now: float,
+) -> Appended:
+    """Store the scans that are new, in the order of seq, and release what need not wait."""
+    _check_backlog(tx.ledger.sites.get(site_name), len(scans), processed, limit)
+    site = tx.site(site_name)
+    robot = tx.robot(site, robot_name)
+    by_session: dict[str, dict[int, NewScan]] = {}
+    for scan in scans:
+        by_session.setdefault(scan.session, {}).setdefault(scan.seq, scan)
+    accepted = 0
+    for session, by_seq in by_session.items():
+        stream = tx.stream(robot, session)
+        known = tx.known(stream, list(by_seq))
+        for seq in sorted(by_seq.keys() - known):
+            tx.add_scan(site, robot, stream, by_seq[seq], now)
+            accepted += 1
+    tx.release_scans(site, robot, now)
+    return Appended(accepted, len(scans) - accepted, site.id, site.position, site.held)
+
+
+def _check_backlog(site: SiteLedger | None, coming: int, processed: int, limit: int) -> None:
+    if site is None:
+        return
+    pending = site.position - processed + site.held
+    # A site that has caught up takes any batch: a limit below a batch's size is no deadlock.
+    if pending > 0 and pending + coming > limit:
+        raise BacklogFullError(pending, limit)
+
+
+def set_mount(tx: Transaction, site_name: str, robot_name: str, mount: bytes) -> None:
+    """Log a mount. What was accepted before is released first: it was taken with the old one."""
+    site = tx.site(site_name)
+    robot = tx.robot(site, robot_name)
+    if robot.mount != mount:
+        tx.release_scans(site, robot, None)
+        tx.add_control(site, robot, "mount", mount)
+        robot.mount = mount
+        tx.connection.execute(
+            update(tables.robots).where(tables.robots.c.id == robot.id).values(mount=mount)
+        )
+
+
+def forget_robot(tx: Transaction, site_name: str, robot_name: str) -> bool:
+    """Log that a robot is forgotten. Its name is free again, for a robot that starts anew."""
+    site = tx.ledger.sites.get(site_name)
+    robot = None if site is None else site.robots.get(robot_name)
+    if site is None or robot is None:
+        return False
+    tx.release_scans(site, robot, None)
+    tx.add_control(site, robot, "forget", None)
+    tx.connection.execute(
+        update(tables.robots).where(tables.robots.c.id == robot.id).values(forgotten=True)
+    )
+    del site.robots[robot_name]
+    site.changed.add(robot_name)
+    return True
+
+
+def delete_site(tx: Transaction, site_name: str) -> int | None:
+    """Forget a site; returns its id. Its rows go later, in portions that block nobody."""
+    site = tx.ledger.sites.pop(site_name, None)
+    if site is None:
+        return None
+    tx.flush()
+    tx.touched.pop(site.id, None)
+    for robot in site.robots.values():
+        tx.ledger.waiting.pop(robot.id, None)
+    tx.connection.execute(
+        update(tables.sites).where(tables.sites.c.id == site.id).values(deleted=True)
+    )
+    return site.id
+
+
+def purge_portion(tx: Transaction) -> bool:
+    """Remove some rows of deleted sites; True while there are more."""
+    connection = tx.connection
+    site_id = connection.execute(
+        select(tables.sites.c.id).where(tables.sites.c.deleted.is_(True)).limit(1)
+    ).scalar()
+    if site_id is None:
+        return False
+    c = tables.entries.c
+    portion = select(c.id).where(c.site_id == site_id).limit(_PURGE_PORTION)
+    gone = connection.execute(delete(tables.entries).where(c.id.in_(portion)))
+    if gone.rowcount == 0:
+        robots = select(tables.robots.c.id).where(tables.robots.c.site_id == site_id)
+        connection.execute(delete(tables.streams).where(tables.streams.c.robot_id.in_(robots)))
+        for table in (tables.robots, tables.skips, tables.snapshots):
+            connection.execute(delete(table).where(table.c.site_id == site_id))
+        connection.execute(delete(tables.sites).where(tables.sites.c.id == site_id))
+    return True
+
+
+def release_due(tx: Transaction, now: float) -> float | None:
+    """Release the scans that have waited long enough; returns when the next one will have."""
+    for site, robot in list(tx.ledger.waiting.values()):
+        tx.release_scans(site, robot, now)
+    deadlines = [robot.order.next_deadline() for _, robot in tx.ledger.waiting.values()]
+    return min((deadline for deadline in deadlines if deadline is not None), default=None)
+
+
+def save_snapshot(tx: Transaction, site_id: int, snapshot: SnapshotRecord) -> None:
+    """Keep a snapshot and the last one before it. Nothing is kept of a site that is gone."""
+    if all(site.id != site_id for site in tx.ledger.sites.values()):
+        return
+    c = tables.snapshots.c
+    tx.connection.execute(
+        delete(tables.snapshots).where(c.site_id == site_id, c.position == snapshot.position)
+    )
+    tx.connection.execute(
+        insert(tables.snapshots).values(
+            site_id=site_id,
+            position=snapshot.position,
+            scans=snapshot.scans,
+            producer=snapshot.producer,
+            data=snapshot.data,
+        )
+    )
+    kept = (
+        select(c.position)
+        .where(c.site_id == site_id)
+        .order_by(c.position.desc())
+        .limit(_SNAPSHOTS_KEPT)
+    )
+    tx.connection.execute(
+        delete(tables.snapshots).where(c.site_id == site_id, c.position.not_in(kept))
+    )
+
+
+def drop_snapshot(tx: Transaction, site_id: int, position: int) -> None:
+    """Remove one snapshot."""
+    c = tables.snapshots.c
+    tx.connection.execute(
+        delete(tables.snapshots).where(c.site_id == site_id, c.position == position)
+    )
+
+
+def record_skip(tx: Transaction, site_id: int, position: int, reason: str) -> Skip:
+    """Note that an entry is not fed again. The first reason stands."""
+    tx.flush()
+    c = tables.skips.c
+    there = select(func.count()).where(c.site_id == site_id, c.position == position)
+    if not tx.connection.execute(there).scalar():
+        tx.connection.execute(
+            insert(tables.skips).values(site_id=site_id, position=position, reason=reason)
+        )
+    return read_skips(tx.connection, site_id, position)[0]

@@ -1,0 +1,92 @@
+"""What the service needs of a storage, and nothing more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from lineloom_service.store.records import (
+    Appended,
+    LogEntry,
+    NewScan,
+    SiteRecord,
+    Skip,
+    SnapshotRecord,
+)
+
+CommitListener = Callable[[SiteRecord], None]
+"""Called on the event loop after a commit changed a site, before the request is answered."""
+
+
+class Store(Protocol):
+    """An append-only log per site, with the order in which the mapper is fed.
+
+    Whatever an `await` returned from is on disk. Names of sites and robots are unique among
+    those that exist; a name that was deleted may be used again for something new.
+    """
+
+    async def open(self) -> None:
+        """Make the storage usable, upgrading an older one."""
+        ...
+
+    async def close(self) -> None:
+        """Let go of it. What was awaited is safe."""
+        ...
+
+    def subscribe(self, listener: CommitListener) -> None:
+        """Have `listener` told of every site that a commit changed."""
+        ...
+
+    async def append_scans(
+        self, site: str, robot: str, scans: Sequence[NewScan], *, processed: int, limit: int
+    ) -> Appended:
+        """Store scans of one robot, creating site and robot on first use.
+
+        Raises BacklogFullError, taking nothing, where more than `limit` entries wait already;
+        `processed`: how many of the site's released entries the mapper is known to be through.
+        """
+        ...
+
+    async def set_mount(self, site: str, robot: str, mount: bytes) -> None:
+        """Log the robot's mount for the scans that follow; the same again changes nothing."""
+        ...
+
+    async def forget_robot(self, site: str, robot: str) -> bool:
+        """Log that a robot is to be forgotten. False where there is none of that name."""
+        ...
+
+    async def delete_site(self, site: str) -> int | None:
+        """Forget a site and all its scans; return its id, None where there is none."""
+        ...
+
+    async def sites(self) -> list[SiteRecord]:
+        """All sites by name."""
+        ...
+
+    async def site(self, site: str) -> SiteRecord | None:
+        """One site."""
+        ...
+
+    async def read_feed(self, site_id: int, after: int, limit: int) -> list[LogEntry]:
+        """Return the released entries after position `after`, at most `limit`, in order."""
+        ...
+
+    async def record_skip(self, site_id: int, position: int, reason: str) -> Skip:
+        """Note durably that this entry is never to be fed again."""
+        ...
+
+    async def skips(self, site_id: int) -> list[Skip]:
+        """All skipped entries of a site by position."""
+        ...
+
+    async def save_snapshot(self, site_id: int, snapshot: SnapshotRecord) -> None:
+        """Keep a snapshot; older ones but the last go."""
+        ...
+
+    async def latest_snapshot(self, site_id: int, producer: str) -> SnapshotRecord | None:
+        """Return the newest snapshot that `producer` wrote."""
+        ...
+
+    async def drop_snapshot(self, site_id: int, position: int) -> None:
+        """Remove a snapshot that turned out unreadable."""
+        ...

@@ -1,0 +1,53 @@
+"""What is asked of the database, beside the writer."""
+
+from __future__ import annotations
+
+from sqlalchemy import Connection, select
+
+from lineloom_service.store import tables
+from lineloom_service.store.records import LogEntry, Skip, SnapshotRecord
+
+
+def read_feed(connection: Connection, site_id: int, after: int, limit: int) -> list[LogEntry]:
+    """Return released entries after a position, in the order of the feed."""
+    e = tables.entries.c
+    query = (
+        select(e.position, e.kind, tables.robots.c.name, tables.streams.c.session, e.seq, e.body)
+        .join_from(tables.entries, tables.robots, tables.robots.c.id == e.robot_id)
+        .outerjoin(tables.streams, tables.streams.c.id == e.stream_id)
+        .where(e.site_id == site_id, e.position > after)
+        .order_by(e.position)
+        .limit(limit)
+    )
+    return [LogEntry(*row) for row in connection.execute(query)]
+
+
+def read_skips(connection: Connection, site_id: int, position: int | None = None) -> list[Skip]:
+    """Return the skipped entries of a site, or the one at `position`."""
+    e, k = tables.entries.c, tables.skips.c
+    query = (
+        select(e.position, tables.robots.c.name, e.kind, tables.streams.c.session, e.seq, k.reason)
+        .join_from(
+            tables.skips, tables.entries, (e.site_id == k.site_id) & (e.position == k.position)
+        )
+        .join(tables.robots, tables.robots.c.id == e.robot_id)
+        .outerjoin(tables.streams, tables.streams.c.id == e.stream_id)
+        .where(k.site_id == site_id)
+        .order_by(k.position)
+    )
+    if position is not None:
+        query = query.where(k.position == position)
+    return [Skip(*row) for row in connection.execute(query)]
+
+
+def read_snapshot(connection: Connection, site_id: int, producer: str) -> SnapshotRecord | None:
+    """Return the newest snapshot that `producer` wrote."""
+    c = tables.snapshots.c
+    query = (
+        select(c.position, c.scans, c.producer, c.data)
+        .where(c.site_id == site_id, c.producer == producer)
+        .order_by(c.position.desc())
+        .limit(1)
+    )
+    row = connection.execute(query).first()
+    return None if row is None else SnapshotRecord(*row)

@@ -1,0 +1,105 @@
+"""What the store takes and gives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+EntryKind = Literal["scan", "mount", "forget"]
+
+
+@dataclass(frozen=True, slots=True)
+class NewScan:
+    """A scan to be stored. body: as `store.codec` encodes it."""
+
+    session: str
+    seq: int
+    body: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class LogEntry:
+    """One entry of a site's log, at its place in the order in which the mapper is fed."""
+
+    position: int
+    kind: EntryKind
+    robot: str
+    session: str | None
+    seq: int | None
+    body: bytes | None
+
+
+@dataclass(frozen=True, slots=True)
+class RobotRecord:
+    """accepted: its durable scans. held: those of them that wait for a gap in seq to fill."""
+
+    name: str
+    accepted: int
+    held: int
+    mount: bytes | None
+
+
+@dataclass(frozen=True, slots=True)
+class SiteRecord:
+    """A site as of the last commit.
+
+    id: never used again, also when a deleted site's name is. position: entries released to the
+    mapper so far, 1..position without holes. held: scans accepted, but not yet released.
+    """
+
+    id: int
+    name: str
+    position: int
+    held: int
+    accepted: int
+    robots: dict[str, RobotRecord] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Appended:
+    """What became of the scans of one POST; position and held are the site's right after it."""
+
+    accepted: int
+    duplicates: int
+    site_id: int
+    position: int
+    held: int
+
+
+@dataclass(frozen=True, slots=True)
+class SnapshotRecord:
+    """A mapper's state after the entry at `position`.
+
+    scans: scan entries among 1..position that the mapper took. producer: the code that wrote it;
+    other code replays the log instead.
+    """
+
+    position: int
+    scans: int
+    producer: str
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Skip:
+    """An entry that is never fed to the mapper again, and why."""
+
+    position: int
+    robot: str
+    kind: EntryKind
+    session: str | None
+    seq: int | None
+    reason: str
+
+
+class BacklogFullError(Exception):
+    """The site's mapper is too far behind; nothing of the POST was taken."""
+
+    def __init__(self, pending: int, limit: int) -> None:
+        super().__init__(f"{pending} entries wait to be mapped, the limit is {limit}")
+        self.pending = pending
+        self.limit = limit
+
+
+class StoreError(Exception):
+    """The storage failed: nothing of the request was taken. The text is safe to show."""

@@ -1,0 +1,115 @@
+"""The tables. Migrations build them; a test holds the two to each other."""
+
+from __future__ import annotations
+
+from sqlalchemy import (
+    BigInteger,
+    Boolean,
+    Column,
+    ForeignKey,
+    Index,
+    Integer,
+    LargeBinary,
+    MetaData,
+    String,
+    Table,
+    UniqueConstraint,
+    false,
+    text,
+)
+
+metadata = MetaData()
+
+# SQLite numbers rows by itself only in a column of type INTEGER.
+_Id = BigInteger().with_variant(Integer, "sqlite")
+
+sites = Table(
+    "sites",
+    metadata,
+    Column("id", _Id, primary_key=True),
+    Column("name", String(64), nullable=False),
+    # Entries released to the mapper so far.
+    Column("position", BigInteger, nullable=False, server_default=text("0")),
+    Column("deleted", Boolean, nullable=False, server_default=false()),
+    Index(
+        "ux_sites_name",
+        "name",
+        unique=True,
+        sqlite_where=text("deleted = 0"),
+        postgresql_where=text("NOT deleted"),
+    ),
+    # A deleted site's id must not come back: it tells an old map's ETag from a new one's.
+    sqlite_autoincrement=True,
+)
+
+robots = Table(
+    "robots",
+    metadata,
+    Column("id", _Id, primary_key=True),
+    Column("site_id", ForeignKey("sites.id"), nullable=False),
+    Column("name", String(64), nullable=False),
+    Column("mount", LargeBinary),
+    Column("forgotten", Boolean, nullable=False, server_default=false()),
+    Index(
+        "ux_robots_site_name",
+        "site_id",
+        "name",
+        unique=True,
+        sqlite_where=text("forgotten = 0"),
+        postgresql_where=text("NOT forgotten"),
+    ),
+)
+
+streams = Table(
+    "streams",
+    metadata,
+    # In the order first seen.
+    Column("id", _Id, primary_key=True),
+    Column("robot_id", ForeignKey("robots.id"), nullable=False),
+    Column("session", String(128), nullable=False),
+    Column("released", BigInteger),
+    Column("highest", BigInteger, nullable=False, server_default=text("-1")),
+    Column("accepted", BigInteger, nullable=False, server_default=text("0")),
+    UniqueConstraint("robot_id", "session", name="ux_streams_robot_session"),
+)
+
+entries = Table(
+    "entries",
+    metadata,
+    # In the order of arrival.
+    Column("id", _Id, primary_key=True),
+    Column("site_id", ForeignKey("sites.id"), nullable=False),
+    Column("robot_id", ForeignKey("robots.id"), nullable=False),
+    Column("kind", String(8), nullable=False),
+    Column("stream_id", ForeignKey("streams.id")),
+    Column("seq", BigInteger),
+    Column("body", LargeBinary),
+    # In the order of the feed; null while a scan waits for those before it.
+    Column("position", BigInteger),
+    UniqueConstraint("stream_id", "seq", name="ux_entries_stream_seq"),
+    UniqueConstraint("site_id", "position", name="ux_entries_site_position"),
+    Index(
+        "ix_entries_held",
+        "site_id",
+        sqlite_where=text("position IS NULL"),
+        postgresql_where=text("position IS NULL"),
+    ),
+)
+
+skips = Table(
+    "skips",
+    metadata,
+    Column("site_id", ForeignKey("sites.id"), primary_key=True, autoincrement=False),
+    Column("position", BigInteger, primary_key=True, autoincrement=False),
+    Column("reason", String, nullable=False),
+)
+
+snapshots = Table(
+    "snapshots",
+    metadata,
+    Column("site_id", ForeignKey("sites.id"), primary_key=True, autoincrement=False),
+    Column("position", BigInteger, primary_key=True, autoincrement=False),
+    Column("scans", BigInteger, nullable=False),
+    Column("producer", String(128), nullable=False),
+    Column("data", LargeBinary, nullable=False),
+)

@@ -1,0 +1,184 @@
+"""One group commit: the writes of many requests, gathered so that they share statements."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from sqlalchemy import Connection, bindparam, insert, select, update
+
+from lineloom_service.store import tables
+from lineloom_service.store.ledger import Ledger, RobotLedger, SiteLedger
+from lineloom_service.store.records import EntryKind, NewScan
+from lineloom_service.store.sequencer import Sequencer, Stream
+
+_PLACE_ENTRY = (
+    update(tables.entries)
+    .where(tables.entries.c.id == bindparam("entry"))
+    .values(position=bindparam("place"))
+)
+_UPDATE_STREAM = (
+    update(tables.streams)
+    .where(tables.streams.c.id == bindparam("stream"))
+    .values(
+        released=bindparam("released"), highest=bindparam("highest"), accepted=bindparam("accepted")
+    )
+)
+_UPDATE_SITE = (
+    update(tables.sites)
+    .where(tables.sites.c.id == bindparam("site"))
+    .values(position=bindparam("place"))
+)
+
+
+class Transaction:
+    """Changes ledger and database together. Used by the writer's thread only.
+
+    connection: within a database transaction that the caller commits, after `flush`. touched: the
+    sites that changed, by id.
+    """
+
+    def __init__(
+        self, connection: Connection, ledger: Ledger, window_s: float, max_held: int
+    ) -> None:
+        self.connection = connection
+        self.ledger = ledger
+        self.touched: dict[int, SiteLedger] = {}
+        self._window_s = window_s
+        self._max_held = max_held
+        self._new: dict[int, dict[str, Any]] = {}
+        self._placed: list[dict[str, int]] = []
+        self._streams: dict[int, Stream] = {}
+
+    def site(self, name: str) -> SiteLedger:
+        """Return a site, made on first use."""
+        site = self.ledger.sites.get(name)
+        if site is None:
+            site = SiteLedger(self._insert(tables.sites, name=name), name)
+            self.ledger.sites[name] = site
+            self.touched[site.id] = site
+        return site
+
+    def robot(self, site: SiteLedger, name: str) -> RobotLedger:
+        """Return a robot, made on first use."""
+        robot = site.robots.get(name)
+        if robot is None:
+            number = self._insert(tables.robots, site_id=site.id, name=name)
+            robot = RobotLedger(number, name, Sequencer(self._window_s, self._max_held))
+            site.robots[name] = robot
+            site.changed.add(name)
+            self.touched[site.id] = site
+        return robot
+
+    def stream(self, robot: RobotLedger, session: str) -> Stream:
+        """Return a session of a robot, made on first use."""
+        stream = robot.order.streams.get(session)
+        if stream is None:
+            number = self._insert(tables.streams, robot_id=robot.id, session=session)
+            stream = robot.order.streams[session] = Stream(number, session)
+        return stream
+
+    def add_scan(
+        self, site: SiteLedger, robot: RobotLedger, stream: Stream, scan: NewScan, now: float
+    ) -> None:
+        """Store a scan that is new; it has no place in the feed yet."""
+        entry = self._add_entry(
+            site, robot, "scan", stream_id=stream.id, seq=scan.seq, body=scan.body
+        )
+        stream.hold(scan.seq, entry, now)
+        site.accepted += 1
+        site.held += 1
+        self._streams[stream.id] = stream
+
+    def add_control(
+        self, site: SiteLedger, robot: RobotLedger, kind: EntryKind, body: bytes | None
+    ) -> None:
+        """Log an operator's action; it is released at once."""
+        entry = self._add_entry(site, robot, kind, stream_id=None, seq=None, body=body)
+        self._place(site, [entry])
+
+    def release_scans(self, site: SiteLedger, robot: RobotLedger, now: float | None) -> None:
+        """Give the scans that need not wait any longer their places; all of them if now is None."""
+        waiting = [stream for stream in robot.order.streams.values() if stream.held]
+        if not waiting:
+            return
+        entries = robot.order.flush() if now is None else robot.order.release(now)
+        if entries:
+            site.held -= len(entries)
+            site.changed.add(robot.name)
+            self._place(site, entries)
+            self._streams.update((stream.id, stream) for stream in waiting)
+        if any(stream.held for stream in waiting):
+            self.ledger.waiting[robot.id] = (site, robot)
+        else:
+            self.ledger.waiting.pop(robot.id, None)
+
+    def known(self, stream: Stream, seqs: Sequence[int]) -> set[int]:
+        """Return those of `seqs` that the stream has already."""
+        doubtful = [seq for seq in seqs if seq <= stream.highest]
+        found: set[int] = set()
+        if doubtful:
+            self.flush()
+            c = tables.entries.c
+            # In portions: a database takes a limited number of parameters in a statement.
+            for start in range(0, len(doubtful), 500):
+                portion = doubtful[start : start + 500]
+                query = select(c.seq).where(c.stream_id == stream.id, c.seq.in_(portion))
+                found.update(self.connection.execute(query).scalars())
+        return found
+
+    def flush(self) -> None:
+        """Send what was gathered to the database."""
+        if self._new:
+            self.connection.execute(insert(tables.entries), list(self._new.values()))
+        if self._placed:
+            self.connection.execute(_PLACE_ENTRY, self._placed)
+        if self._streams:
+            self.connection.execute(_UPDATE_STREAM, [_row(s) for s in self._streams.values()])
+        if self.touched:
+            places = [{"site": s.id, "place": s.position} for s in self.touched.values()]
+            self.connection.execute(_UPDATE_SITE, places)
+        self._new = {}
+        self._placed = []
+        self._streams = {}
+
+    def _add_entry(
+        self, site: SiteLedger, robot: RobotLedger, kind: EntryKind, **columns: object
+    ) -> int:
+        entry = self.ledger.next_entry
+        self.ledger.next_entry += 1
+        self._new[entry] = {
+            "id": entry,
+            "site_id": site.id,
+            "robot_id": robot.id,
+            "kind": kind,
+            "position": None,
+            **columns,
+        }
+        site.changed.add(robot.name)
+        self.touched[site.id] = site
+        return entry
+
+    def _place(self, site: SiteLedger, entries: Iterable[int]) -> None:
+        for entry in entries:
+            site.position += 1
+            if entry in self._new:
+                self._new[entry]["position"] = site.position
+            else:
+                self._placed.append({"entry": entry, "place": site.position})
+        self.touched[site.id] = site
+
+    def _insert(self, table: Any, **values: object) -> int:
+        result = self.connection.execute(insert(table).values(**values))
+        key = result.inserted_primary_key
+        assert key is not None
+        return int(key[0])
+
+
+def _row(stream: Stream) -> dict[str, Any]:
+    return {
+        "stream": stream.id,
+        "released": stream.released,
+        "highest": stream.highest,
+        "accepted": stream.accepted,
+    }

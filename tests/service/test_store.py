@@ -1,0 +1,302 @@
+"""The laws of the scan log, on the SQLite store."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Sequence
+from pathlib import Path
+
+import pytest
+import sqlalchemy as sa
+from alembic.autogenerate import compare_metadata
+from alembic.migration import MigrationContext
+from lineloom_service.store import (
+    BacklogFullError,
+    NewScan,
+    SiteRecord,
+    SnapshotRecord,
+    SqliteStore,
+    StoreError,
+    tables,
+)
+from lineloom_service.store.database import sqlite_engine
+from lineloom_service.store.migrate import downgrade, migrate
+
+NO_LIMIT = 10**9
+
+
+def _scans(seqs: Sequence[int], session: str = "0") -> list[NewScan]:
+    return [NewScan(session, seq, f"{session}/{seq}".encode()) for seq in seqs]
+
+
+def _store(path: Path, window: float = 0.2) -> SqliteStore:
+    return SqliteStore(path / "lineloom.db", gap_window_s=window, max_held=1000)
+
+
+async def _post(
+    store: SqliteStore, seqs: Sequence[int], session: str = "0", robot: str = "r"
+) -> int:
+    answer = await store.append_scans(
+        "site", robot, _scans(seqs, session), processed=0, limit=NO_LIMIT
+    )
+    return answer.accepted
+
+
+async def _record(store: SqliteStore) -> SiteRecord:
+    record = await store.site("site")
+    assert record is not None
+    return record
+
+
+async def _feed(store: SqliteStore) -> list[tuple[str, str | None, int | None]]:
+    entries = await store.read_feed((await _record(store)).id, 0, 10_000)
+    assert [e.position for e in entries] == list(range(1, len(entries) + 1))
+    return [(e.kind, e.session, e.seq) for e in entries]
+
+
+@pytest.fixture
+async def store(tmp_path: Path) -> AsyncIterator[SqliteStore]:
+    store = _store(tmp_path)
+    await store.open()
+    yield store
+    await store.close()
+
+
+async def test_sending_again_changes_nothing(store: SqliteStore) -> None:
+    assert await _post(store, range(10)) == 10
+    again = await store.append_scans("site", "r", _scans(range(5, 15)), processed=0, limit=NO_LIMIT)
+    assert (again.accepted, again.duplicates) == (5, 5)
+    assert [seq for _, _, seq in await _feed(store)] == list(range(15))
+
+
+async def test_the_same_seq_twice_in_one_post_is_one_scan(store: SqliteStore) -> None:
+    answer = await store.append_scans(
+        "site", "r", _scans([0, 1, 1, 0]), processed=0, limit=NO_LIMIT
+    )
+    assert (answer.accepted, answer.duplicates) == (2, 2)
+
+
+async def test_sessions_and_robots_count_for_themselves(store: SqliteStore) -> None:
+    assert await _post(store, [0, 1]) == 2
+    assert await _post(store, [0, 1], session="1") == 2
+    assert await _post(store, [0, 1], robot="other") == 2
+    record = await _record(store)
+    assert record.accepted == 6
+    assert record.robots["r"].accepted == 4
+
+
+async def test_a_batch_is_sorted_and_a_gap_waits_until_it_is_filled(store: SqliteStore) -> None:
+    await _post(store, [2, 0, 4, 1])
+    record = await _record(store)
+    assert (record.position, record.held, record.accepted) == (3, 1, 4)
+    await _post(store, [3])
+    assert [seq for _, _, seq in await _feed(store)] == [0, 1, 2, 3, 4]
+
+
+async def test_a_gap_that_stays_is_passed_after_the_window(store: SqliteStore) -> None:
+    await _post(store, [0, 5, 7])
+    assert (await _record(store)).position == 1
+    await asyncio.sleep(0.4)
+    record = await _record(store)
+    assert (record.position, record.held) == (3, 0)
+    await _post(store, [6])
+    assert [seq for _, _, seq in await _feed(store)] == [0, 5, 7, 6]
+
+
+async def test_held_scans_survive_a_restart(tmp_path: Path) -> None:
+    store = _store(tmp_path, window=60.0)
+    await store.open()
+    await _post(store, [0, 2, 3])
+    await store.close()
+    store = _store(tmp_path, window=60.0)
+    await store.open()
+    record = await _record(store)
+    assert (record.position, record.held, record.accepted) == (1, 2, 3)
+    assert await _post(store, [1, 2]) == 1
+    assert [seq for _, _, seq in await _feed(store)] == [0, 1, 2, 3]
+    await store.close()
+
+
+async def test_the_feed_never_changes_once_given(tmp_path: Path) -> None:
+    store = _store(tmp_path, window=0.05)
+    await store.open()
+    await _post(store, [3, 1])
+    await asyncio.sleep(0.2)
+    await _post(store, [0, 2, 4])
+    before = await _feed(store)
+    await store.close()
+    store = _store(tmp_path)
+    await store.open()
+    assert await _feed(store) == before
+    await store.close()
+
+
+async def test_concurrent_posts_share_commits_and_each_counts_once(store: SqliteStore) -> None:
+    commits = 0
+
+    def count(_: SiteRecord) -> None:
+        nonlocal commits
+        commits += 1
+
+    store.subscribe(count)
+    accepted = await asyncio.gather(*(_post(store, [seq]) for seq in range(200)))
+    assert sum(accepted) == 200
+    assert commits < 100
+    assert [seq for _, _, seq in await _feed(store)] == list(range(200))
+
+
+async def test_a_mount_is_logged_once_between_the_scans_it_divides(store: SqliteStore) -> None:
+    await _post(store, [0, 2])
+    await store.set_mount("site", "r", b"m")
+    await store.set_mount("site", "r", b"m")
+    await _post(store, [3])
+    assert await _feed(store) == [
+        ("scan", "0", 0),
+        ("scan", "0", 2),
+        ("mount", None, None),
+        ("scan", "0", 3),
+    ]
+    assert (await _record(store)).robots["r"].mount == b"m"
+
+
+async def test_a_forgotten_robot_may_start_anew(store: SqliteStore) -> None:
+    await _post(store, [0, 1])
+    assert await store.forget_robot("site", "r")
+    assert not await store.forget_robot("site", "r")
+    assert "r" not in (await _record(store)).robots
+    assert await _post(store, [0]) == 1
+    record = await _record(store)
+    assert record.accepted == 3
+    assert record.robots["r"].accepted == 1
+    assert [kind for kind, _, _ in await _feed(store)] == ["scan", "scan", "forget", "scan"]
+
+
+async def test_a_deleted_site_leaves_nothing_and_its_id_never_comes_back(
+    store: SqliteStore, tmp_path: Path
+) -> None:
+    await _post(store, range(50))
+    old = (await _record(store)).id
+    await store.save_snapshot(old, SnapshotRecord(50, 50, "me", b"data"))
+    assert await store.delete_site("site") == old
+    assert await store.site("site") is None
+    assert await store.delete_site("site") is None
+    for _ in range(200):
+        await asyncio.sleep(0.02)
+        if not await store.read_feed(old, 0, 1):
+            break
+    assert await _post(store, [0]) == 1
+    assert (await _record(store)).id > old
+    engine = sqlite_engine(tmp_path / "lineloom.db")
+    for _ in range(200):
+        with engine.connect() as connection:
+            count = connection.execute(
+                sa.select(sa.func.count()).select_from(tables.sites)
+            ).scalar()
+        if count == 1:
+            break
+        await asyncio.sleep(0.02)
+    assert count == 1
+    engine.dispose()
+
+
+async def test_a_full_backlog_takes_nothing(store: SqliteStore) -> None:
+    await _post(store, range(10))
+    with pytest.raises(BacklogFullError) as refusal:
+        await store.append_scans("site", "r", _scans(range(10, 20)), processed=2, limit=15)
+    assert refusal.value.pending == 8
+    assert (await _record(store)).accepted == 10
+    taken = await store.append_scans("site", "r", _scans(range(10, 20)), processed=5, limit=15)
+    assert taken.accepted == 10
+
+
+async def test_a_site_that_has_caught_up_takes_any_batch(store: SqliteStore) -> None:
+    answer = await store.append_scans("site", "r", _scans(range(10)), processed=0, limit=5)
+    assert answer.accepted == 10
+
+
+async def test_one_failing_request_does_not_spoil_the_commit_it_shares(store: SqliteStore) -> None:
+    await _post(store, [0])
+    results = await asyncio.gather(
+        _post(store, [1]),
+        store.record_skip(999, 1, "no such site"),
+        _post(store, [2]),
+        return_exceptions=True,
+    )
+    assert results[0] == results[2] == 1
+    assert isinstance(results[1], StoreError)
+    assert [seq for _, _, seq in await _feed(store)] == [0, 1, 2]
+
+
+async def test_skips_name_their_scan_and_the_first_reason_stands(store: SqliteStore) -> None:
+    await _post(store, [0, 1])
+    site = (await _record(store)).id
+    await store.record_skip(site, 2, "first")
+    skip = await store.record_skip(site, 2, "second")
+    assert (skip.robot, skip.session, skip.seq, skip.reason) == ("r", "0", 1, "first")
+    assert await store.skips(site) == [skip]
+
+
+async def test_two_snapshots_are_kept_and_only_of_the_same_producer_used(
+    store: SqliteStore,
+) -> None:
+    await _post(store, range(5))
+    site = (await _record(store)).id
+    for position in (1, 3, 5):
+        await store.save_snapshot(site, SnapshotRecord(position, position, "v1", b"%d" % position))
+    latest = await store.latest_snapshot(site, "v1")
+    assert latest == SnapshotRecord(5, 5, "v1", b"5")
+    assert await store.latest_snapshot(site, "v2") is None
+    await store.drop_snapshot(site, 5)
+    assert await store.latest_snapshot(site, "v1") == SnapshotRecord(3, 3, "v1", b"3")
+    await store.drop_snapshot(site, 3)
+    assert await store.latest_snapshot(site, "v1") is None
+
+
+async def test_a_second_service_on_the_same_directory_is_refused(
+    store: SqliteStore, tmp_path: Path
+) -> None:
+    with pytest.raises(StoreError, match="another Lineloom service"):
+        await _store(tmp_path).open()
+
+
+async def test_an_older_database_is_upgraded_with_what_it_holds(tmp_path: Path) -> None:
+    store = _store(tmp_path)
+    await store.open()
+    await _post(store, range(3))
+    await store.close()
+    engine = sqlite_engine(tmp_path / "lineloom.db")
+    with engine.begin() as connection:
+        downgrade(connection, "0001")
+        assert "snapshots" not in sa.inspect(connection).get_table_names()
+    engine.dispose()
+    store = _store(tmp_path)
+    await store.open()
+    assert [seq for _, _, seq in await _feed(store)] == [0, 1, 2]
+    assert await store.latest_snapshot((await _record(store)).id, "v1") is None
+    await store.close()
+
+
+async def test_a_newer_database_is_refused_in_plain_words(tmp_path: Path) -> None:
+    engine = sqlite_engine(tmp_path / "lineloom.db")
+    with engine.begin() as connection:
+        migrate(connection)
+        connection.execute(sa.text("UPDATE alembic_version SET version_num = '9999'"))
+    engine.dispose()
+    with pytest.raises(StoreError, match="newer version"):
+        await _store(tmp_path).open()
+
+
+def test_migrations_and_tables_say_the_same(tmp_path: Path) -> None:
+    engine = sqlite_engine(tmp_path / "lineloom.db")
+    with engine.begin() as connection:
+        migrate(connection)
+        differences = compare_metadata(MigrationContext.configure(connection), tables.metadata)
+    engine.dispose()
+    assert differences == []
+
+
+async def test_an_unusable_directory_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    store = SqliteStore(tmp_path / "file" / "lineloom.db", gap_window_s=1.0, max_held=10)
+    with pytest.raises(StoreError, match="cannot use"):
+        await store.open()
