@@ -14,6 +14,7 @@ from lineloom_core.simulation.planner import Planner
 
 _SPACING_M = 2.5
 _TRIES = 600
+_STRAY_M = 0.5
 _MARGIN = 1.1  # lengths along the grid are up to 8 % too long
 
 Tour = tuple[float, NDArray[np.float64]]
@@ -70,8 +71,21 @@ def plan_tours(
     for robot, pose in enumerate(poses):
         own = {k for k in spare if owner[k] == robot}
         order = _order(table, robot, own, spare - own, common, budget_m)
-        tours.append((pose.theta, points[order]))
+        stops = [points[order[0]], *(_beside(planner, points[k], rng) for k in order[1:])]
+        tours.append((pose.theta, np.array(stops)))
     return tours
+
+
+def _beside(
+    planner: Planner, point: NDArray[np.float64], rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """Move a stop a little where there is room: no two robots drive in the same track."""
+    space = planner.space
+    for _ in range(8):
+        moved: NDArray[np.float64] = point + rng.uniform(-_STRAY_M, _STRAY_M, size=2)
+        if space.world.is_move_free(point, moved, space.radius + space.cell):
+            return moved
+    return point
 
 
 def _spread_starts(
