@@ -1,0 +1,104 @@
+"""Which observations are one wall: merging by summed moments, longest first."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lineloom_core.fusion import _kernels as kernels
+from lineloom_core.fusion.segment_map import LineObservations
+
+_LEAST_SIGMA_M = 1e-3  # no lidar line is better known than that; keeps weights comparable
+_MAX_ROUNDS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class FusionConfig:
+    """When two segments are one wall, and which walls are kept.
+
+    max_angle: between directions [rad]; they are oriented, so the two faces of a thin wall never
+    merge. max_offset: across, where they overlap [m]. max_gap: along [m]. max_spread: rms distance
+    of the merged mass from its line [m]; keeps the chords of a curved wall apart. min_length,
+    min_support: walls shorter [m] or seen by fewer keyframes are dropped. min_length_alone: the
+    same for walls seen by one keyframe only. end_slack: where at least four keyframes saw a wall,
+    one observation that overshoots its end by less than this [m] does not move the end.
+    """
+
+    max_angle: float = math.radians(6.0)
+    max_offset: float = 0.08
+    max_gap: float = 0.15
+    max_spread: float = 0.05
+    min_length: float = 0.2
+    min_support: int = 1
+    min_length_alone: float = 0.2
+    end_slack: float = 0.3
+
+
+def merge_observations(
+    observations: LineObservations, config: FusionConfig
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return the wall of each observation (n,) and the walls' moments and ends (m, 10).
+
+    Observations are taken longest first (ties: oldest first), so that lines grow from what is
+    known best, and what comes out does not depend on the order of the input. Walls that have grown
+    together are merged in further rounds by the same rule, until nothing changes. Columns as in
+    `_kernels`. Observations without length get -1.
+    """
+    labels = np.full(len(observations), -1, dtype=np.int64)
+    lengths = _lengths(observations.endpoints)
+    solid = np.flatnonzero(lengths > 1e-6)
+    lines = as_pieces(
+        observations.endpoints[solid], observations.sigma[solid], observations.weight[solid]
+    )
+    age = observations.id[solid]
+    inner = np.arange(solid.size)
+    for _ in range(_MAX_ROUNDS):
+        before = lines.shape[0]
+        order = np.lexsort((age, -_lengths(lines[:, kernels.X1 : kernels.Y2 + 1])))
+        step, lines = kernels.merge_pass(
+            lines,
+            order,
+            math.cos(config.max_angle),
+            config.max_offset,
+            config.max_gap,
+            config.max_spread,
+        )
+        inner = step[inner]
+        age = oldest(step, age, lines.shape[0])
+        if lines.shape[0] == before:
+            break
+    labels[solid] = inner
+    return labels, lines
+
+
+def as_pieces(
+    endpoints: NDArray[np.float64], sigma: NDArray[np.float64], weight: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return segments as moments (n, 10): mass weight / sigma^2 spread evenly along each."""
+    delta = endpoints[:, 2:] - endpoints[:, :2]
+    mass = weight / np.maximum(sigma, _LEAST_SIGMA_M) ** 2
+    pieces = np.empty((endpoints.shape[0], kernels.COLUMNS))
+    pieces[:, kernels.W] = mass
+    pieces[:, kernels.CX : kernels.CY + 1] = 0.5 * (endpoints[:, :2] + endpoints[:, 2:])
+    pieces[:, kernels.SXX] = mass * delta[:, 0] ** 2 / 12.0
+    pieces[:, kernels.SXY] = mass * delta[:, 0] * delta[:, 1] / 12.0
+    pieces[:, kernels.SYY] = mass * delta[:, 1] ** 2 / 12.0
+    pieces[:, kernels.X1 : kernels.Y2 + 1] = endpoints
+    return pieces
+
+
+def oldest(labels: NDArray[np.int64], age: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """Return the least age (id) in each of `count` groups, shape (count,)."""
+    least = np.full(count, np.iinfo(np.int64).max, dtype=np.int64)
+    np.minimum.at(least, labels, age)
+    return least
+
+
+def _lengths(endpoints: NDArray[np.float64]) -> NDArray[np.float64]:
+    lengths: NDArray[np.float64] = np.hypot(
+        endpoints[:, 2] - endpoints[:, 0], endpoints[:, 3] - endpoints[:, 1]
+    )
+    return lengths
