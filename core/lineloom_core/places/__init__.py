@@ -1,0 +1,6 @@
+"""Places: submaps that are recognised without any pose."""
+
+from lineloom_core.places.place import Glimpse, Place
+from lineloom_core.places.recognition import Recognition, RecognitionConfig, recognise
+
+__all__ = ["Glimpse", "Place", "Recognition", "RecognitionConfig", "recognise"]

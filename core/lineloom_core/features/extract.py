@@ -1,0 +1,103 @@
+"""Line segments, end points and edges of one scan (thesis chapter 3)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lineloom_core.features import _kernels
+from lineloom_core.scan import Scan
+
+
+@dataclass(frozen=True, slots=True)
+class ExtractionConfig:
+    """Parameters of feature extraction; lengths in metres, angles in radians.
+
+    sigma: range noise. break_angle: flattest incidence still taken for one surface (adaptive
+    break points, lambda). split: Algorithm 1's threshold t. merge_factor: collinear neighbours
+    are merged when their joint maximum deviation stays below merge_factor * split.
+    max_gap_beams: beams without a return that do not break a surface. max_gap: how far apart two
+    collinear runs may lie to be merged all the same. corner_reach: how far an angle
+    edge may lie from the ends of its two lines.
+    """
+
+    sigma: float = 0.015
+    break_angle: float = math.radians(8.0)
+    split: float = 0.065
+    merge_factor: float = 0.8
+    min_points: int = 5
+    min_length: float = 0.2
+    max_gap_beams: int = 6
+    max_gap: float = 0.3
+    corner_reach: float = 0.35
+
+
+@dataclass(frozen=True, eq=False)
+class ScanFeatures:
+    """What a scan shows, in the laser's frame; n lines in counter-clockwise order (Table 3.1).
+
+    lines: (n, 12): x1, y1, x2, y2 [m], direction [rad] and signed offset [m] along the left
+        normal, length [m], variances of direction [rad^2] and of the offset at the centroid
+        [m^2], number of points, first and last beam. Oriented: scanned from 1 to 2, so the free
+        side lies on the left and directions span the full 360 degrees (§4.3).
+    ends: (n, 2) INTERIOR, EDGE or UNKNOWN for start and end (§3.2). edges: (n, 2, 2) the corner
+        points that go with EDGE ends (§3.3), elsewhere the bare end points.
+    points: (m, 2) finite returns [m], surface by surface; beams: (m,) their indices;
+        breaks: (m,) True at the last point of each surface.
+    ranges, angle_min, angle_increment: the sweep itself, counter-clockwise, for free-space checks.
+    """
+
+    lines: NDArray[np.float64]
+    ends: NDArray[np.int64]
+    edges: NDArray[np.float64]
+    points: NDArray[np.float64]
+    beams: NDArray[np.int64]
+    breaks: NDArray[np.bool_]
+    ranges: NDArray[np.float64]
+    angle_min: float
+    angle_increment: float
+
+    def __len__(self) -> int:
+        return int(self.lines.shape[0])
+
+    def normals(self) -> NDArray[np.float64]:
+        """Unit normals of the points towards the free side, (m, 2); zeros where there is none."""
+        found: NDArray[np.float64] = _kernels.point_normals(self.points, self.breaks, 3)
+        return found
+
+
+def extract_features(
+    scan: Scan, config: ExtractionConfig | None = None, *, inverted: bool = False
+) -> ScanFeatures:
+    """Extract the features of one scan; `inverted` = the lidar is mounted upside down."""
+    config = config or ExtractionConfig()
+    if scan.angle_increment < 0 or inverted:
+        scan = scan.counter_clockwise(inverted=inverted)
+    points, beams, breaks, lines, ends, edges = _kernels.extract(
+        scan.ranges,
+        scan.angle_min,
+        scan.angle_increment,
+        config.sigma,
+        config.break_angle,
+        config.split,
+        config.merge_factor,
+        config.min_points,
+        config.min_length,
+        config.max_gap_beams,
+        config.max_gap,
+        config.corner_reach,
+    )
+    return ScanFeatures(
+        lines=lines,
+        ends=ends,
+        edges=edges,
+        points=points,
+        beams=beams,
+        breaks=breaks,
+        ranges=scan.ranges,
+        angle_min=scan.angle_min,
+        angle_increment=scan.angle_increment,
+    )

@@ -1,0 +1,74 @@
+"""All parameters of a site's mapper in one place."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from lineloom_core.features import ExtractionConfig
+from lineloom_core.fusion import FusionConfig
+from lineloom_core.mapping.tracker import TrackerConfig
+from lineloom_core.places.recognition import RecognitionConfig
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceConfig:
+    """span: metres of way in a place; stride: how far apart places begin; most_keyframes in one."""
+
+    span: float = 5.0
+    stride: float = 2.5
+    most_keyframes: int = 14
+    least_keyframes: int = 4
+
+
+@dataclass(frozen=True, slots=True)
+class ClosureConfig:
+    """Closing loops where the graph already knows that two keyframes are near each other.
+
+    radius [m], angle [rad]: how near. apart [m]: way driven in between, less is no loop. reach_xy,
+    reach_theta: how wrong the graph may be. The rest: checks as in recognition.
+    """
+
+    radius: float = 2.5
+    angle: float = math.radians(70.0)
+    apart: float = 12.0
+    reach_xy: float = 0.4
+    reach_theta: float = 0.1
+    least_fit: float = 0.6
+    most_conflict: float = 0.08
+    every: int = 2
+
+
+@dataclass(frozen=True, slots=True)
+class JoinConfig:
+    """Believing a set of candidate constraints.
+
+    least_set: mutually consistent constraints that join two components. least_evidence: metres of
+    wall in the set. lead: how many times the evidence of the best rival set. most_conflict: share
+    of points in free space over all places that would overlap. drift: growth of a track's error
+    (m per m, rad per m) on top of (m, rad).
+    """
+
+    least_set: int = 3
+    least_evidence: float = 60.0
+    lead: float = 2.0
+    most_conflict: float = 0.08
+    drift_floor: tuple[float, float] = (0.06, 0.01)
+    drift_rate: tuple[float, float] = (0.01, 0.0008)
+    loop_gate: float = 3.0
+    most_candidates: int = 64
+
+
+@dataclass(frozen=True, slots=True)
+class MapperConfig:
+    """Parameters of `SiteMapper`; the defaults are those that every figure was measured with."""
+
+    extraction: ExtractionConfig = field(default_factory=ExtractionConfig)
+    tracker: TrackerConfig = field(default_factory=TrackerConfig)
+    places: PlaceConfig = field(default_factory=PlaceConfig)
+    recognition: RecognitionConfig = field(default_factory=RecognitionConfig)
+    closure: ClosureConfig = field(default_factory=ClosureConfig)
+    join: JoinConfig = field(default_factory=JoinConfig)
+    fusion: FusionConfig = field(default_factory=FusionConfig)
+    least_fit_late: float = 0.6
+    """Share of a late scan that must lie on its neighbours' surfaces."""

@@ -1,0 +1,97 @@
+"""An edge of the pose graph with its history: what was measured, what became of it and why."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lineloom_core.geometry import Pose
+from lineloom_core.graph import Edge, project_out_weak
+from lineloom_core.mapping.site_view import ConstraintKind, ConstraintState
+
+INDEPENDENT_SHARE = 0.05
+"""Neighbouring points of a scan err together: this share of them counts as independent."""
+
+_FLOOR = np.diag([0.006**2, 0.006**2, 0.002**2])  # m^2, m^2, rad^2: the lidar's own limits
+
+
+@dataclass(frozen=True, eq=False)
+class Constraint:
+    """T_a_b between two keyframes and its state.
+
+    information: 3x3 in the tangent at b. place_a, place_b: the places it came from, -1 where it
+    came from two keyframes alone. evidence: metres of wall that speak for it.
+    """
+
+    id: str
+    kind: ConstraintKind
+    state: ConstraintState
+    keyframe_a: int
+    keyframe_b: int
+    T_a_b: Pose
+    information: NDArray[np.float64]
+    reason: str
+    checks: dict[str, float] = field(default_factory=dict)
+    consistency_set: tuple[str, ...] = ()
+    place_a: int = -1
+    place_b: int = -1
+    evidence: float = 0.0
+
+    def moved_to(
+        self, state: ConstraintState, reason: str, *, consistency_set: tuple[str, ...] = ()
+    ) -> Constraint:
+        """The same constraint in another state, for the reason given."""
+        return replace(
+            self,
+            state=state,
+            reason=reason,
+            consistency_set=consistency_set or self.consistency_set,
+        )
+
+    def edge(self) -> Edge:
+        """The constraint as the solver takes it."""
+        return Edge(
+            id=self.id,
+            kind=self.kind,
+            node_a=self.keyframe_a,
+            node_b=self.keyframe_b,
+            T_a_b=self.T_a_b,
+            information=self.information,
+            robust=self.kind != "sequential",
+        )
+
+
+def turned(information: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
+    """Information on (x, y, theta) seen from axes that are rotated by `angle` [rad]."""
+    c, s = math.cos(angle), math.sin(angle)
+    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    result: NDArray[np.float64] = R.T @ information @ R
+    return result
+
+
+def step_information(
+    registered: NDArray[np.float64], prior_sigma: tuple[float, float]
+) -> NDArray[np.float64]:
+    """Information of a tracked step: correlated points, a weak motion prior, the lidar's floor.
+
+    prior_sigma: how far (m, rad) the motion model can be off where nothing is observed.
+    """
+    hold = np.diag([prior_sigma[0] ** -2, prior_sigma[0] ** -2, prior_sigma[1] ** -2])
+    covariance = np.linalg.inv(INDEPENDENT_SHARE * registered + hold) + _FLOOR
+    return _symmetric(np.linalg.inv(covariance))
+
+
+def closure_information(registered: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Information of a loop or rendezvous: only what is really observed, the floor added."""
+    seen = project_out_weak(INDEPENDENT_SHARE * registered)
+    # (seen^-1 + floor)^-1 without inverting the singular: W = S - S (S + F^-1)^-1 S.
+    inner = np.linalg.inv(seen + np.linalg.inv(_FLOOR))
+    return _symmetric(seen - seen @ inner @ seen)
+
+
+def _symmetric(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    result: NDArray[np.float64] = 0.5 * (matrix + matrix.T)
+    return result

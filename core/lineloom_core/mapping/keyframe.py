@@ -1,0 +1,48 @@
+"""A scan that stays: a node of the pose graph."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from lineloom_core.features import ExtractionConfig, ScanFeatures, extract_features
+from lineloom_core.geometry import Pose
+from lineloom_core.matching.local_map import Cloud
+from lineloom_core.scan import Scan
+
+
+@dataclass(frozen=True, eq=False)
+class Keyframe:
+    """One kept scan.
+
+    scan: counter-clockwise, mount inversion already undone. track: the run of tracking without a
+    break that it belongs to. T_track_laser: where the tracker put it; the graph knows better.
+    Features and cloud are functions of the scan; a snapshot leaves them out.
+    """
+
+    id: int
+    robot: str
+    track: int
+    scan: Scan
+    T_track_laser: Pose
+    extraction: ExtractionConfig = field(repr=False)
+
+    @cached_property
+    def features(self) -> ScanFeatures:
+        """Lines, ends, edges and points of the scan."""
+        return extract_features(self.scan, self.extraction)
+
+    @cached_property
+    def cloud(self) -> Cloud:
+        """The points with normals, for registration."""
+        return Cloud.of(self.features)
+
+    def __getstate__(self) -> dict[str, Any]:
+        state = dict(self.__dict__)
+        state.pop("features", None)
+        state.pop("cloud", None)
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)

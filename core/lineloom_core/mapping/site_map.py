@@ -1,0 +1,133 @@
+"""The site's shared memory: keyframes, tracks, places, constraints and the graph over them."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lineloom_core.geometry import Pose
+from lineloom_core.graph import PoseGraph, optimize
+from lineloom_core.mapping.config import MapperConfig
+from lineloom_core.mapping.constraint import Constraint
+from lineloom_core.mapping.keyframe import Keyframe
+from lineloom_core.mapping.robot_record import Track
+from lineloom_core.places import Place
+
+
+class SiteMap:
+    """Keyframes are numbered in the order they were made, tracks and places likewise."""
+
+    def __init__(self, config: MapperConfig) -> None:
+        self.config = config
+        self.keyframes: dict[int, Keyframe] = {}
+        self.tracks: dict[int, Track] = {}
+        self.places: dict[int, Place] = {}
+        self.constraints: dict[str, Constraint] = {}
+        self.graph = PoseGraph()
+        self.merged_into: dict[str, str] = {}
+        self.looped_tracks: dict[int, None] = {}
+        self._numbers = {"keyframe": 0, "track": 0, "place": 0, "constraint": 0}
+
+    def number(self, what: str) -> int:
+        """The next free number for a keyframe, track, place or constraint."""
+        self._numbers[what] += 1
+        return self._numbers[what] - 1
+
+    def pose(self, keyframe: int) -> Pose:
+        """T_map_laser of a keyframe in its component's frame, as the graph has it now."""
+        return self.graph.nodes[keyframe]
+
+    def component_root(self, keyframe: int) -> int:
+        """The oldest keyframe of the component: its anchor and name giver."""
+        return self.graph.component_root(keyframe)
+
+    def component_id(self, keyframe: int) -> str:
+        """Stable id of the keyframe's component: that of its oldest track."""
+        return f"c{self.keyframes[self.component_root(keyframe)].track}"
+
+    def same_component(self, a: int, b: int) -> bool:
+        """Whether the relative pose of two keyframes is known."""
+        return self.graph.connected(a, b)
+
+    def way_between(self, a: int, b: int) -> float:
+        """Metres over which error may have grown between two keyframes of one component.
+
+        The way driven on one track; across tracks, or where loops have closed, the error is that
+        of the shorter way: a few times the distance.
+        """
+        straight = self.pose(a).distance(self.pose(b))
+        around = 3.0 * straight + 5.0
+        ka, kb = self.keyframes[a], self.keyframes[b]
+        if ka.track != kb.track:
+            return around
+        driven = self.driven_between(a, b)
+        return min(driven, around) if ka.track in self.looped_tracks else driven
+
+    def driven_between(self, a: int, b: int) -> float:
+        """Metres driven from one keyframe to another of the same track."""
+        track = self.tracks[self.keyframes[a].track]
+        return abs(self._travelled(track, a) - self._travelled(track, b))
+
+    def drift(self, a: int, b: int) -> NDArray[np.float64]:
+        """Covariance (3, 3) of T_a_b within one component, in the tangent at b."""
+        if a == b:
+            return np.zeros((3, 3))
+        join = self.config.join
+        way = self.way_between(a, b)
+        theta = join.drift_rate[1] * way
+        across = join.drift_rate[0] * way + 0.5 * theta * self.pose(a).distance(self.pose(b))
+        return np.diag([across**2, across**2, theta**2])
+
+    def add_constraint(self, constraint: Constraint) -> None:
+        """Remember a constraint; an accepted one goes into the graph."""
+        self.constraints[constraint.id] = constraint
+        in_graph = constraint.id in self.graph.edges
+        if constraint.state == "accepted" and not in_graph:
+            self.graph.add_edge(constraint.edge())
+            if constraint.kind != "sequential":
+                for keyframe in (constraint.keyframe_a, constraint.keyframe_b):
+                    self.looped_tracks[self.keyframes[keyframe].track] = None
+        elif constraint.state != "accepted" and in_graph:
+            self.graph.remove_edge(constraint.id)
+
+    def new_constraint_id(self) -> str:
+        """The next constraint id."""
+        return f"k{self.number('constraint')}"
+
+    def optimise(self, keyframe: int) -> None:
+        """Solve the component of a keyframe; its oldest keyframe stays where it is."""
+        nodes, edges = self.graph.component_subgraph(keyframe)
+        solution = optimize(nodes, edges, anchors=(min(nodes),))
+        self.graph.set_poses(solution.poses)
+
+    def nearby(self, keyframe: int, radius: float) -> list[tuple[int, float]]:
+        """Keyframes of the same component within `radius` m, nearest first, with distances."""
+        here = self.pose(keyframe)
+        root = self.component_root(keyframe)
+        found = [
+            (math.hypot(pose.x - here.x, pose.y - here.y), other)
+            for other, pose in self.graph.nodes.items()
+            if other != keyframe
+            and abs(pose.x - here.x) <= radius
+            and abs(pose.y - here.y) <= radius
+            and self.graph.component_root(other) == root
+        ]
+        return [(other, d) for d, other in sorted(found) if d <= radius]
+
+    def neighbours_on_track(self, keyframe: int, reach: int) -> list[int]:
+        """The keyframe and up to `reach` before and after it on its track, itself first."""
+        chain = self.tracks[self.keyframes[keyframe].track].keyframes
+        where = _position(chain, keyframe)
+        around = chain[max(where - reach, 0) : where + reach + 1]
+        return sorted(around, key=lambda k: (abs(_position(chain, k) - where), k))
+
+    def _travelled(self, track: Track, keyframe: int) -> float:
+        return track.travelled[_position(track.keyframes, keyframe)]
+
+
+def _position(chain: list[int], keyframe: int) -> int:
+    """Index of a keyframe in its chain, which ascends."""
+    return bisect_left(chain, keyframe)

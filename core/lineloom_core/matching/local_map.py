@@ -1,0 +1,140 @@
+"""The surroundings a robot has just seen, ready to register the next scan against."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lineloom_core.features import ScanFeatures
+from lineloom_core.geometry import Pose
+from lineloom_core.matching import _registration_kernels as _kernels
+
+
+@dataclass(frozen=True, eq=False)
+class Cloud:
+    """A scan's points as registration wants them.
+
+    points (n, 2) [m] and normals (n, 2) in the laser frame; weights (n,): each point's share of
+    wall, at most 1, so that dense near clutter does not outvote far walls. sparse: a thinned
+    subset for the exhaustive search.
+    """
+
+    points: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    sparse: NDArray[np.float64]
+
+    @staticmethod
+    def of(features: ScanFeatures) -> Cloud:
+        """Prepare the points of one scan."""
+        points = features.points
+        ranges = np.sqrt(points[:, 0] ** 2 + points[:, 1] ** 2)
+        weights = np.minimum(ranges * features.angle_increment / 0.05, 1.0)
+        sparse = points[_kernels.thin(points, 0.12, 90)]
+        return Cloud(points, features.normals(), weights, sparse)
+
+
+@dataclass(frozen=True, eq=False)
+class LocalMap:
+    """A grid of averaged surface points with normals (see `_registration_kernels`), in some keyframe chain's
+    frame. Built anew when a keyframe is added: that is cheaper than forgetting old ones.
+    """
+
+    index: NDArray[np.int32]
+    surface: NDArray[np.float64]
+    field: NDArray[np.uint8]
+    ox: float
+    oy: float
+
+    @staticmethod
+    def build(
+        clouds: Iterable[tuple[Cloud, Pose]], *, reach: float = 18.0, searchable: bool = True
+    ) -> LocalMap:
+        """Merge clouds at their poses, first come first served; points up to `reach` m away.
+
+        Without `searchable` the field stays empty and `search` finds nothing.
+        """
+        rows = [(cloud, pose.to_array()) for cloud, pose in clouds]
+        box = np.array([np.inf, np.inf, -np.inf, -np.inf])
+        for cloud, pose in rows:
+            _kernels.bounds(cloud.points, pose, reach, box)
+        if not np.all(np.isfinite(box)):
+            box = np.zeros(4)
+        margin = 3 * _kernels.CELL
+        ox, oy = float(box[0] - margin), float(box[1] - margin)
+        nx = math.ceil((box[2] + margin - ox) / _kernels.CELL)
+        ny = math.ceil((box[3] + margin - oy) / _kernels.CELL)
+        index = np.full((nx, ny), -1, dtype=np.int32)
+        surface = np.empty((sum(len(c.points) for c, _ in rows) + 1, 5))
+        used = 0
+        for cloud, pose in rows:
+            used = _kernels.insert_points(
+                index, surface, used, ox, oy, cloud.points, cloud.normals, pose, reach
+            )
+        field = np.zeros((nx, ny) if searchable else (0, 0), dtype=np.uint8)
+        if searchable:
+            _kernels.fill_field(field, surface, used, ox, oy)
+        return LocalMap(index, surface[:used].copy(), field, ox, oy)
+
+    def search(
+        self,
+        cloud: Cloud,
+        guess: Pose,
+        *,
+        reach_xy: float,
+        reach_theta: float,
+        pull: float = 0.1,
+        step_xy: float = 0.1,
+        step_theta: float = math.radians(1.5),
+    ) -> tuple[Pose, float]:
+        """Best pose in a window around `guess` by exhaustive correlation, and its score 0..1."""
+        best = _kernels.correlate(
+            self.field, self.ox, self.oy, cloud.sparse, guess.to_array(),
+            reach_xy, reach_theta, step_xy, step_theta, pull,
+        )  # fmt: skip
+        return Pose.from_array(best[:3]), float(best[3])
+
+    def register(
+        self,
+        cloud: Cloud,
+        guess: Pose,
+        *,
+        prior: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        gate: float = 0.25,
+        sigma: float = 0.03,
+        iterations: int = 12,
+    ) -> Registration:
+        """Refine `guess` by point-to-line registration (see `_registration_kernels.register`)."""
+        pose, H, stats = _kernels.register(
+            self.index, self.surface, self.ox, self.oy,
+            cloud.points, cloud.normals, cloud.weights, guess.to_array(),
+            np.array(prior), gate, sigma, iterations,
+        )  # fmt: skip
+        return Registration(
+            Pose.from_array(pose), H, float(stats[0]), float(stats[1]), float(stats[2])
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Registration:
+    """Outcome of a registration: pose of the cloud in the map's frame.
+
+    information: 3x3 over x, y, theta in the map frame, points taken as independent (so far too
+    sure: callers scale it). matched, total: weight of points on a surface and of all inside the
+    grid. rms [m] over the matched.
+    """
+
+    pose: Pose
+    information: NDArray[np.float64]
+    matched: float
+    total: float
+    rms: float
+
+    @property
+    def fit(self) -> float:
+        """Share of the points that lie on a known surface, 0..1."""
+        return self.matched / self.total if self.total > 0.0 else 0.0

@@ -1,0 +1,153 @@
+"""A place: a few metres of one robot's way, as place recognition sees it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lineloom_core.features import EDGE, ScanFeatures
+from lineloom_core.features._kernels import (
+    LENGTH,
+    LINE_COLUMNS,
+    OFFSET,
+    THETA,
+    VAR_OFFSET,
+    VAR_THETA,
+)
+from lineloom_core.fusion import LineObservations, fuse
+from lineloom_core.geometry import Pose
+from lineloom_core.matching.local_map import Cloud, LocalMap
+
+_CORNER_REACH = 0.15
+
+
+@dataclass(frozen=True, eq=False)
+class Glimpse:
+    """One keyframe's contribution to a place: what it saw and where it stood."""
+
+    keyframe: int
+    features: ScanFeatures
+    cloud: Cloud
+    T_anchor_laser: Pose
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A submap, all in the frame of its anchor keyframe.
+
+    lines (n, 12), ends (n, 2), edges (n, 2, 2): fused oriented lines as `ScanFeatures` has them.
+    surface: the averaged points as a cloud; local_map: the same, to register against.
+    ranges (k, b), angle_mins, angle_increments (k,), sweep_poses (k, 3): the sweeps for
+    free-space checks, padded with NaN.
+    """
+
+    id: int
+    track: int
+    anchor: int
+    keyframes: tuple[int, ...]
+    poses: tuple[Pose, ...]
+    lines: NDArray[np.float64]
+    ends: NDArray[np.int64]
+    edges: NDArray[np.float64]
+    surface: Cloud
+    local_map: LocalMap
+    ranges: NDArray[np.float64]
+    angle_mins: NDArray[np.float64]
+    angle_increments: NDArray[np.float64]
+    sweep_poses: NDArray[np.float64]
+
+    @staticmethod
+    def of(id: int, track: int, anchor: int, glimpses: Sequence[Glimpse]) -> Place:  # noqa: A002
+        """Fuse the glimpses of consecutive keyframes of one track."""
+        local_map = LocalMap.build(
+            ((g.cloud, g.T_anchor_laser) for g in glimpses), reach=20.0, searchable=False
+        )
+        lines, ends, edges = _fuse_lines(glimpses)
+        beams = max(len(g.features.ranges) for g in glimpses)
+        ranges = np.full((len(glimpses), beams), np.nan)
+        for k, g in enumerate(glimpses):
+            ranges[k, : len(g.features.ranges)] = g.features.ranges
+        return Place(
+            id=id,
+            track=track,
+            anchor=anchor,
+            keyframes=tuple(g.keyframe for g in glimpses),
+            poses=tuple(g.T_anchor_laser for g in glimpses),
+            lines=lines,
+            ends=ends,
+            edges=edges,
+            surface=_surface_cloud(local_map),
+            local_map=local_map,
+            ranges=ranges,
+            angle_mins=np.array([g.features.angle_min for g in glimpses]),
+            angle_increments=np.array([g.features.angle_increment for g in glimpses]),
+            sweep_poses=np.array([g.T_anchor_laser.to_array() for g in glimpses]),
+        )
+
+
+def _surface_cloud(local_map: LocalMap) -> Cloud:
+    surface = local_map.surface
+    points = np.ascontiguousarray(surface[:, :2])
+    normals = np.ascontiguousarray(surface[:, 2:4])
+    return Cloud(points, normals, np.ones(len(points)), points[::4].copy())
+
+
+def _fuse_lines(
+    glimpses: Sequence[Glimpse],
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+    """Fused lines of a place with the corners that any of its scans saw at their ends."""
+    segments, sigmas, keyframes = [], [], []
+    corners: tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]] = ([], [])
+    for g in glimpses:
+        f = g.features
+        ends = g.T_anchor_laser.transform(f.lines[:, :4].reshape(-1, 2)).reshape(-1, 4)
+        segments.append(ends)
+        sigmas.append(np.sqrt(f.lines[:, VAR_OFFSET]))
+        keyframes.append(np.full(len(f), g.keyframe, dtype=np.int64))
+        for side in range(2):
+            seen = f.edges[f.ends[:, side] == EDGE, side]
+            corners[side].append(g.T_anchor_laser.transform(seen))
+    observed = np.concatenate(segments)
+    n = len(observed)
+    fused = fuse(
+        LineObservations(
+            endpoints=observed,
+            sigma=np.concatenate(sigmas),
+            weight=np.ones(n),
+            keyframe=np.concatenate(keyframes),
+            robot=np.zeros(n, dtype=np.int64),
+            stamp=np.zeros(n),
+            id=np.arange(n, dtype=np.int64),
+        )
+    )
+    return _as_line_rows(fused.endpoints, fused.sigma, corners)
+
+
+def _as_line_rows(
+    endpoints: NDArray[np.float64],
+    sigma: NDArray[np.float64],
+    corners: tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]],
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+    n = len(endpoints)
+    lines = np.zeros((n, LINE_COLUMNS))
+    direction = endpoints[:, 2:] - endpoints[:, :2]
+    length = np.hypot(direction[:, 0], direction[:, 1])
+    unit = direction / np.maximum(length, 1e-9)[:, None]
+    middle = 0.5 * (endpoints[:, 2:] + endpoints[:, :2])
+    lines[:, :4] = endpoints
+    lines[:, THETA] = np.arctan2(direction[:, 1], direction[:, 0])
+    lines[:, OFFSET] = unit[:, 0] * middle[:, 1] - unit[:, 1] * middle[:, 0]
+    lines[:, LENGTH] = length
+    lines[:, VAR_OFFSET] = sigma**2
+    lines[:, VAR_THETA] = 12.0 * sigma**2 / np.maximum(length, 0.1) ** 2
+    ends = np.zeros((n, 2), dtype=np.int64)
+    edges = endpoints.reshape(n, 2, 2).copy()
+    for side in range(2):
+        seen = np.concatenate(corners[side]) if corners[side] else np.empty((0, 2))
+        if n and len(seen):
+            d = np.linalg.norm(edges[:, side, None, :] - seen[None, :, :], axis=2)
+            ends[d.min(axis=1) < _CORNER_REACH, side] = EDGE
+    return lines, ends, edges
