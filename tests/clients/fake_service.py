@@ -45,6 +45,10 @@ class FakeService:
                 return route(request)
             if request.method == "POST" and request.url.path.endswith("/scans"):
                 return self._ingest(request)
+            if request.url.path == "/readyz":
+                return httpx.Response(200, json={"ready": True, "reasons": []})
+            if request.url.path.count("/") == 3:
+                return self._site(request.url.path.rsplit("/", 1)[1])
         return problem(404, "not-found", "nothing here")(request)
 
     async def asynchronous(self, request: httpx.Request) -> httpx.Response:
@@ -52,6 +56,18 @@ class FakeService:
 
     def delivered(self, robot: str = "r") -> list[tuple[str, int]]:
         return [(session, seq) for _, name, session, seq in self.scans if name == robot]
+
+    def _site(self, name: str) -> httpx.Response:
+        """Answer for a site whose map is always done, all its robots in one component."""
+        keys = [key for key in self.scans if key[0] == name]
+        if not keys:
+            return problem(404, "no-site", f"no site {name}")(httpx.Request("GET", "/"))
+        robots = sorted({robot for _, robot, _, _ in keys})
+        counts = {"accepted": len(keys), "processed": len(keys), "pending": 0}
+        body = {"site": name, "version": len(keys), "idle": True, "scans": counts}
+        body |= {"robots": robots, "merged_into": {}}
+        body |= {"components": [{"id": "c1", "robots": robots, "keyframes": 1}]}
+        return httpx.Response(200, json=body | {"constraints": {"loop": {"accepted": 2}}})
 
     def _ingest(self, request: httpx.Request) -> httpx.Response:
         _, _, _, site, _, robot, _ = request.url.path.split("/")
@@ -98,9 +114,15 @@ def served(service: FakeService) -> tuple[ThreadingHTTPServer, str]:
     class Handler(BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"
 
+        def do_GET(self) -> None:
+            self._answer()
+
         def do_POST(self) -> None:
-            content = self.rfile.read(int(self.headers["Content-Length"]))
-            request = httpx.Request("POST", f"http://x{self.path}", content=content)
+            self._answer()
+
+        def _answer(self) -> None:
+            content = self.rfile.read(int(self.headers.get("Content-Length", 0)))
+            request = httpx.Request(self.command, f"http://x{self.path}", content=content)
             request.headers.update(dict(self.headers))
             answer = service(request)
             self.send_response(answer.status_code)

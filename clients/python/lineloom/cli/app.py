@@ -1,0 +1,83 @@
+"""The program `lineloom`: gathers the commands and turns errors into one line."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from lineloom.cli import demo, match, replay, serve, simulate, status
+from lineloom.cli import map as map_command
+from lineloom.cli.console import note
+from lineloom.cli.failure import EXIT_CODES, explained
+
+
+class Commands(TyperGroup):
+    """Runs a command; what went wrong is said in one line, without a traceback."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run, and exit with the code that fits the error."""
+        try:
+            return super().invoke(ctx)
+        except Exception as error:
+            told = explained(error)
+            if told is None:
+                # Typer's own (usage, exit), or a bug of ours, whose traceback is wanted.
+                raise
+            note(f"lineloom: {told}")
+            raise typer.Exit(int(told.code)) from None
+
+
+app = typer.Typer(
+    cls=Commands,
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"lineloom {importlib.metadata.version('lineloom-client')}")
+        raise typer.Exit
+
+
+_ABOUT = f"""Many robots, one line map: send laser scans, ask for the map.
+
+\b
+First steps:
+  lineloom demo
+  lineloom serve
+  lineloom replay run.clf --split 3
+  lineloom map --format svg --output map.svg
+
+\b
+{EXIT_CODES}
+"""
+
+
+@app.callback(help=_ABOUT)
+def about(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_version, is_eager=True, help="Say the version."),
+    ] = False,
+) -> None:
+    """Take the options before the command."""
+
+
+app.command("serve")(serve.serve)
+app.command("demo")(demo.demo)
+app.command("replay")(replay.replay)
+app.command("simulate")(simulate.simulate)
+app.command("map")(map_command.map_)
+app.command("match")(match.match)
+app.command("status")(status.status)
+
+
+def main() -> None:
+    """Run the program."""
+    app(prog_name="lineloom")

@@ -1,0 +1,62 @@
+"""How a command fails: one clear line that says what to do next, and a documented exit code."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+from lineloom.errors import (
+    AccessDeniedError,
+    ConnectionFailedError,
+    LineloomError,
+    NotIdleError,
+    UnexpectedAnswerError,
+)
+
+
+class Exit(IntEnum):
+    """Exit codes of every command."""
+
+    OK = 0
+    FAILED = 1
+    USAGE = 2
+    UNREACHABLE = 3
+    NEGATIVE = 4
+
+
+EXIT_CODES = """Exit codes:
+  0  done
+  1  it failed: a file or the service said no; the message says why
+  2  the command line is wrong
+  3  the service cannot be reached
+  4  done, but the answer is no: no match, robots not merged, map not idle in time"""
+
+
+class CommandError(Exception):
+    """Ends a command. The message is one line; `code` is the exit code."""
+
+    def __init__(self, message: str, code: Exit = Exit.FAILED) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+def explained(error: Exception) -> CommandError | None:
+    """Return what to tell the user of an error, or None for one that is a bug of ours."""
+    if isinstance(error, CommandError):
+        return error
+    if isinstance(error, ConnectionFailedError):
+        return CommandError(
+            f"{error}. Start a service with `lineloom serve`, or name one with --url or "
+            "LINELOOM_URL.",
+            Exit.UNREACHABLE,
+        )
+    if isinstance(error, NotIdleError):
+        return CommandError(f"{error}. See `lineloom status` later.", Exit.NEGATIVE)
+    if isinstance(error, AccessDeniedError):
+        return CommandError(f"{error}. Give a token with --token or LINELOOM_TOKEN.")
+    if isinstance(error, UnexpectedAnswerError):
+        return CommandError(f"{error}. Is this address a Lineloom service of this version?")
+    if isinstance(error, LineloomError):
+        return CommandError(str(error))
+    if isinstance(error, OSError) and error.filename is not None:
+        return CommandError(f"{error.filename}: {error.strerror}")
+    return None

@@ -1,0 +1,24 @@
+"""How patient a command is with the service."""
+
+from __future__ import annotations
+
+from lineloom.client import Client
+from lineloom.retry import RetryPolicy
+
+_WARM_UP_S = 60.0
+
+
+def quick() -> RetryPolicy:
+    """Someone waits at the terminal: a service that is not there is told soon."""
+    return RetryPolicy(attempts=3, first_delay=0.2)
+
+
+def patient() -> RetryPolicy:
+    """A file can wait: where the service is behind, the play goes on when it has caught up."""
+    return RetryPolicy(attempts=100, max_delay=2.0, max_retry_after=120.0)
+
+
+def require_ready(client: Client) -> None:
+    """Raise ConnectionFailedError at once where nothing answers; let a service warm up."""
+    if not client.ready().ready:
+        client.wait_until_ready(_WARM_UP_S)

@@ -1,0 +1,67 @@
+"""`lineloom serve`: the service in this process."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from lineloom.cli.failure import CommandError
+
+
+def serve(
+    host: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Address to listen on; 127.0.0.1.")
+    ] = None,
+    port: Annotated[
+        int | None, typer.Option(min=0, max=65535, metavar="PORT", help="Port to listen on; 8765.")
+    ] = None,
+    data_dir: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Where everything is kept; ./lineloom-data."),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(min=1, max=64, metavar="N", help="Mapping processes; all cores but one."),
+    ] = None,
+    open_: Annotated[
+        bool | None,
+        typer.Option("--open", help="Listen beyond this machine although nothing protects it."),
+    ] = None,
+    log_level: Annotated[
+        str | None,
+        typer.Option(metavar="LEVEL", help="debug, info, warning or error; info."),
+    ] = None,
+) -> None:
+    """Run the service: takes scans over HTTP, keeps them on disk, maps them.
+
+    Stop it with Ctrl-C or SIGTERM; the next start goes on where it stopped. Every setting may
+    also come from the environment, e.g. LINELOOM_PORT; options go first.
+
+    \b
+    Example:
+      lineloom serve --port 8765 --data-dir /var/lib/lineloom
+    """
+    try:
+        from lineloom_service.server import run
+        from lineloom_service.settings import Settings
+    except ImportError as error:
+        missing = (error.name or "").split(".")[0]
+        raise CommandError(
+            f"the service is not installed here ({missing or error} is missing): "
+            "`pip install lineloom-client[server]`"
+        ) from None
+    given: dict[str, Any] = {
+        "host": host,
+        "port": port,
+        "data_dir": data_dir,
+        "workers": workers,
+        "open": open_,
+        "log_level": log_level,
+    }
+    try:
+        settings = Settings(**{name: value for name, value in given.items() if value is not None})
+    except ValueError as error:
+        raise CommandError(f"settings: {error}") from None
+    run(settings)

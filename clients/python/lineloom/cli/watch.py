@@ -1,0 +1,81 @@
+"""Progress on the terminal: scans sent, scans in the map, components and merges."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+from typing import Self
+
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from lineloom.cli.console import err
+from lineloom.cli.player import Played
+from lineloom.client import Client
+from lineloom.errors import NotFoundError
+from lineloom.wire import Site
+
+_POLL_S = 0.5
+
+
+class Watch:
+    """Two bars on stderr, and a line for every merge. Asks the service twice a second at most."""
+
+    def __init__(self, client: Client, site: str, total: int, *, already: int = 0) -> None:
+        self._client = client
+        self._site = site
+        self._already = already
+        self._asked_at = 0.0
+        self._merged: set[str] = set()
+        self._progress = Progress(
+            TextColumn("{task.description:7}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            TextColumn("{task.fields[state]}"),
+            console=err,
+            # Where nobody looks, a bar is noise.
+            disable=not err.is_terminal,
+        )
+        self._sent = self._progress.add_task("sent", total=total, state="")
+        self._mapped = self._progress.add_task("mapped", total=total, state="")
+
+    def __enter__(self) -> Self:
+        self._progress.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._progress.stop()
+
+    def on_sent(self, played: Played) -> None:
+        """Show what was sent, and now and then what the map made of it."""
+        self._progress.update(self._sent, completed=played.sent)
+        if time.monotonic() - self._asked_at < _POLL_S:
+            return
+        try:
+            self.on_site(self._client.site(self._site))
+        except NotFoundError:
+            # The site comes into being with its first scan; it may have refused that one.
+            self._asked_at = time.monotonic()
+
+    def on_site(self, site: Site) -> None:
+        """Show the state of the map."""
+        self._asked_at = time.monotonic()
+        done = site.scans.processed + site.scans.skipped - self._already
+        parts = len(site.components)
+        state = f"{parts} component{'' if parts == 1 else 's'}"
+        self._progress.update(self._mapped, completed=max(0, done), state=state)
+        for absorbed, survivor in site.merged_into.items():
+            if absorbed not in self._merged:
+                self._merged.add(absorbed)
+                robots = next((c.robots for c in site.components if c.id == survivor), [])
+                err.print(
+                    f"  component {absorbed} joined {survivor}: {', '.join(robots)} "
+                    f"(after {done} scans)",
+                    markup=False,
+                    soft_wrap=True,
+                )
