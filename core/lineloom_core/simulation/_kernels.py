@@ -97,6 +97,16 @@ def _enter(
 
 
 @njit(cache=True)
+def _stride(o: float, d: float, origin: float, cell: float, at: int) -> tuple[int, float, float]:
+    """Return for one axis: the step from cell to cell, where the beam leaves cell `at`, and how far
+    it is from one border to the next."""
+    if d == 0.0:
+        return 1, math.inf, math.inf
+    ahead = at + 1 if d > 0.0 else at
+    return (1 if d > 0.0 else -1), (origin + ahead * cell - o) / d, cell / abs(d)
+
+
+@njit(cache=True)
 def _cast(
     walls: Floats,
     starts: Ints,
@@ -119,14 +129,8 @@ def _cast(
         return math.inf
     c = max(0, min(columns - 1, math.floor((ox + t * dx - origin_x) / cell)))
     r = max(0, min(rows - 1, math.floor((oy + t * dy - origin_y) / cell)))
-    step_c, step_r = (1 if dx > 0.0 else -1), (1 if dy > 0.0 else -1)
-    next_x, next_y, per_x, per_y = math.inf, math.inf, math.inf, math.inf
-    if dx != 0.0:
-        next_x = (origin_x + (c + (1 if dx > 0.0 else 0)) * cell - ox) / dx
-        per_x = cell / abs(dx)
-    if dy != 0.0:
-        next_y = (origin_y + (r + (1 if dy > 0.0 else 0)) * cell - oy) / dy
-        per_y = cell / abs(dy)
+    step_c, next_x, per_x = _stride(ox, dx, origin_x, cell, c)
+    step_r, next_y, per_y = _stride(oy, dy, origin_y, cell, r)
     best = math.inf
     while 0 <= c < columns and 0 <= r < rows and t <= t_end:
         at = r * columns + c

@@ -73,16 +73,7 @@ class Fleet:
         ]
         members = _crew(world, drives, lidar or scanner_360(), rng, seed, duration_s, odometry)
         crowd = (Walkers.strolling(planner, people, rng),) if people else ()
-        if see_each_other:
-            bodies = [
-                Walkers(tuple(d for d in drives if d is not own), ROBOT_RADIUS_M) for own in drives
-            ]
-            members = [
-                replace(m, blockers=(*crowd, b)) for m, b in zip(members, bodies, strict=True)
-            ]
-        else:
-            members = [replace(m, blockers=crowd) for m in members]
-        return Fleet(world, tuple(members))
+        return Fleet(world, tuple(_among(members, crowd, see_each_other=see_each_other)))
 
     @staticmethod
     def office(
@@ -144,6 +135,18 @@ def _crew(
         )
         for index, drive in enumerate(drives)
     ]
+
+
+def _among(
+    members: Sequence[SimulatedRobot], crowd: tuple[Walkers, ...], *, see_each_other: bool
+) -> list[SimulatedRobot]:
+    """Put people, and if asked the other robots, into every robot's beams."""
+    placed = []
+    for own in members:
+        others = tuple(m.drive for m in members if m is not own and see_each_other)
+        bodies = (Walkers(others, ROBOT_RADIUS_M),) if others else ()
+        placed.append(replace(own, blockers=(*crowd, *bodies)))
+    return placed
 
 
 def _way(robot: SimulatedRobot) -> NDArray[np.float64]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +57,11 @@ class FreeSpace:
         largest = int(np.argmax(np.bincount(labels.ravel())[1:])) + 1
         return FreeSpace(world, radius, (x0, y0), cell, clearance, labels == largest)
 
+    @cached_property
+    def cells(self) -> NDArray[np.int64]:
+        """All reachable cells, shape (n, 2), rows row, column."""
+        return np.argwhere(self.reachable)
+
     @property
     def area(self) -> float:
         """Size of the reachable floor [m^2]."""
@@ -70,17 +76,14 @@ class FreeSpace:
 
     def nearest_cell(self, x: float, y: float) -> tuple[int, int]:
         """Return (row, column) of the reachable cell nearest to (x, y)."""
-        rows, columns = np.nonzero(self.reachable)
-        dx = self.origin[0] + (columns + 0.5) * self.cell - x
-        dy = self.origin[1] + (rows + 0.5) * self.cell - y
-        at = int(np.argmin(dx * dx + dy * dy))
-        return int(rows[at]), int(columns[at])
+        offset = (self.cells[:, ::-1] + 0.5) * self.cell + np.array(self.origin) - (x, y)
+        row, column = self.cells[int(np.argmin(np.sum(offset * offset, axis=1)))]
+        return int(row), int(column)
 
     def random_point(self, rng: np.random.Generator) -> tuple[float, float]:
         """Draw a point [m] on the reachable floor, uniform up to the grid."""
-        rows, columns = np.nonzero(self.reachable)
-        at = int(rng.integers(len(rows)))
-        return self.centre(int(rows[at]), int(columns[at]))
+        row, column = self.cells[int(rng.integers(len(self.cells)))]
+        return self.centre(int(row), int(column))
 
     def random_pose(self, rng: np.random.Generator) -> Pose:
         """Draw a collision-free pose on the reachable floor, facing anywhere."""

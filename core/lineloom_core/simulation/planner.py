@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
@@ -29,15 +29,11 @@ class Planner:
     """
 
     space: FreeSpace
-    cells: NDArray[np.int64] = field(init=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "cells", np.argwhere(self.space.reachable))
 
     @cached_property
     def _node_of_cell(self) -> NDArray[np.int64]:
         nodes = np.full(self.space.reachable.shape, -1, dtype=np.int64)
-        nodes[self.cells[:, 0], self.cells[:, 1]] = np.arange(len(self.cells))
+        nodes[self.space.cells[:, 0], self.space.cells[:, 1]] = np.arange(len(self.space.cells))
         return nodes
 
     @cached_property
@@ -62,7 +58,7 @@ class Planner:
             weights.append(0.5 * step * (cost[here][both] + cost[there][both]))
         s, t, w = (np.concatenate(parts) for parts in (sources, targets, weights))
         ends = (np.concatenate([s, t]), np.concatenate([t, s]))
-        return sparse.csr_matrix((np.concatenate([w, w]), ends), shape=(len(self.cells),) * 2)
+        return sparse.csr_matrix((np.concatenate([w, w]), ends), shape=(len(self.space.cells),) * 2)
 
     def path(self, start: ArrayLike, goal: ArrayLike) -> NDArray[np.float64]:
         """Return a collision-free path from start to goal, corner points of shape (k, 2) [m].
@@ -106,7 +102,7 @@ class Planner:
         return int(self._node_of_cell[row, column])
 
     def _centres(self, nodes: NDArray[np.int64]) -> NDArray[np.float64]:
-        rows_columns = self.cells[nodes]
+        rows_columns = self.space.cells[nodes]
         origin = np.array(self.space.origin)
         centres: NDArray[np.float64] = origin + (rows_columns[:, ::-1] + 0.5) * self.space.cell
         return centres
@@ -114,7 +110,7 @@ class Planner:
     def _pull_straight(self, nodes: NDArray[np.int64]) -> NDArray[np.float64]:
         """Replace stretches of the grid path by straight moves that come no closer to walls."""
         centres = self._centres(nodes)
-        room = self.space.clearance[tuple(self.cells[nodes].T)]
+        room = self.space.clearance[tuple(self.space.cells[nodes].T)]
         kept, at = [0], 0
         while at < len(nodes) - 1:
             at = self._farthest_straight(centres, room, at)

@@ -68,7 +68,7 @@ class World:
     @cached_property
     def solid(self) -> NDArray[np.float64]:
         """Everything a robot must not touch: walls and glass, shape (n + m, 4) [m]."""
-        return np.ascontiguousarray(np.vstack([self.walls, self.glass]))
+        return _checked(np.vstack([self.walls, self.glass]), "solid")
 
     @cached_property
     def grid(self) -> WallGrid:
