@@ -8,23 +8,30 @@ from typing import Self
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from lineloom.cli.console import err
+from lineloom.cli.console import err, note
 from lineloom.cli.player import Played
 from lineloom.client import Client
 from lineloom.errors import NotFoundError
 from lineloom.wire import Site
 
 _POLL_S = 0.5
+_LINE_S = 5.0
 
 
 class Watch:
-    """Two bars on stderr, and a line for every merge. Asks the service twice a second at most."""
+    """Two bars on stderr, and a line for every merge. Asks the service twice a second at most.
+
+    Where stderr is no terminal, as under CI, a line every few seconds stands for the bars.
+    """
 
     def __init__(self, client: Client, site: str, total: int, *, already: int = 0) -> None:
         self._client = client
         self._site = site
+        self._total = total
         self._already = already
+        self._sent_count = 0
         self._asked_at = 0.0
+        self._told_at = time.monotonic()
         self._merged: set[str] = set()
         self._progress = Progress(
             TextColumn("{task.description:7}"),
@@ -33,7 +40,6 @@ class Watch:
             TimeElapsedColumn(),
             TextColumn("{task.fields[state]}"),
             console=err,
-            # Where nobody looks, a bar is noise.
             disable=not err.is_terminal,
         )
         self._sent = self._progress.add_task("sent", total=total, state="")
@@ -53,6 +59,7 @@ class Watch:
 
     def on_sent(self, played: Played) -> None:
         """Show what was sent, and now and then what the map made of it."""
+        self._sent_count = played.sent
         self._progress.update(self._sent, completed=played.sent)
         if time.monotonic() - self._asked_at < _POLL_S:
             return
@@ -65,17 +72,21 @@ class Watch:
     def on_site(self, site: Site) -> None:
         """Show the state of the map."""
         self._asked_at = time.monotonic()
-        done = site.scans.processed + site.scans.skipped - self._already
+        done = max(0, site.scans.processed + site.scans.skipped - self._already)
         parts = len(site.components)
         state = f"{parts} component{'' if parts == 1 else 's'}"
-        self._progress.update(self._mapped, completed=max(0, done), state=state)
+        self._progress.update(self._mapped, completed=done, state=state)
+        self._tell_merges(site, done)
+        if not err.is_terminal and time.monotonic() - self._told_at >= _LINE_S:
+            self._told_at = time.monotonic()
+            note(f"sent {self._sent_count} of {self._total}, mapped {done}, {state}")
+
+    def _tell_merges(self, site: Site, done: int) -> None:
         for absorbed, survivor in site.merged_into.items():
-            if absorbed not in self._merged:
-                self._merged.add(absorbed)
-                robots = next((c.robots for c in site.components if c.id == survivor), [])
-                err.print(
-                    f"  component {absorbed} joined {survivor}: {', '.join(robots)} "
-                    f"(after {done} scans)",
-                    markup=False,
-                    soft_wrap=True,
-                )
+            if absorbed in self._merged:
+                continue
+            self._merged.add(absorbed)
+            robots = next((c.robots for c in site.components if c.id == survivor), [])
+            note(
+                f"component {absorbed} joined {survivor}: {', '.join(robots)} (after {done} scans)"
+            )

@@ -1,0 +1,51 @@
+"""Progress where nobody has a terminal: merges are told once each, and lines stand for bars."""
+
+from __future__ import annotations
+
+import pytest
+from lineloom import Client
+from lineloom.cli import watch
+from lineloom.cli.player import Played
+from lineloom.cli.watch import Watch
+from lineloom.wire import Component, ScanCounts, Site
+
+from tests.clients.fake_service import FakeService
+
+
+def site(processed: int, merged: dict[str, str]) -> Site:
+    left = {"c1", "c2", "c3"} - set(merged)
+    return Site(
+        site="s",
+        version=processed,
+        idle=False,
+        scans=ScanCounts(accepted=90, processed=processed, pending=90 - processed),
+        robots=["a", "b", "c"],
+        components=[Component(id=name, robots=["a", "b"], keyframes=3) for name in sorted(left)],
+        merged_into=merged,
+        constraints={},
+    )
+
+
+def test_merges_and_progress_are_told(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], loopback: str
+) -> None:
+    monkeypatch.setattr(watch, "_LINE_S", 0.0)
+    with Client(loopback) as client, Watch(client, "s", 90, already=10) as shown:
+        shown.on_site(site(40, {}))
+        shown.on_site(site(60, {"c2": "c1"}))
+        shown.on_site(site(70, {"c2": "c1"}))
+    told = capsys.readouterr().err.splitlines()
+    assert told == [
+        "sent 0 of 90, mapped 30, 3 components",
+        "component c2 joined c1: a, b (after 50 scans)",
+        "sent 0 of 90, mapped 50, 2 components",
+        "sent 0 of 90, mapped 60, 2 components",
+    ]
+
+
+def test_the_service_is_asked_now_and_then_only(loopback: str, fake: FakeService) -> None:
+    with Client(loopback) as client, Watch(client, "s", 90) as shown:
+        for sent in range(50):
+            # The site is not there yet: that is no reason to stop.
+            shown.on_sent(Played(sent=sent))
+    assert len(fake.requests) == 1
