@@ -1,0 +1,210 @@
+"""The embedded engine: worker processes on this machine, sites spread over them."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import deque
+from collections.abc import Awaitable, Sequence
+from dataclasses import dataclass, field
+
+from lineloom_service.engine.mapper import SITE_MAPPER
+from lineloom_service.engine.messages import (
+    Failed,
+    Fed,
+    Feed,
+    Ready,
+    Report,
+    Snapshot,
+    Started,
+    StartSite,
+    StopSite,
+    TakeSnapshot,
+    View,
+)
+from lineloom_service.engine.protocol import (
+    MapperFailedError,
+    RestoreFailedError,
+    ViewListener,
+    WorkerDiedError,
+)
+from lineloom_service.engine.worker_process import WorkerProcess
+from lineloom_service.store import LogEntry
+
+_LOG = logging.getLogger(__name__)
+_RESPAWN_S = 0.1
+_RESPAWN_LIMIT_S = 10.0
+
+
+@dataclass(slots=True)
+class _Slot:
+    """A worker's place: one process after another. stillborn: in a row died before ready."""
+
+    number: int
+    process: WorkerProcess | None = None
+    ready: asyncio.Event = field(default_factory=asyncio.Event)
+    stillborn: int = 0
+    sites: set[int] = field(default_factory=set)
+    last_words: str = ""
+
+
+@dataclass(slots=True)
+class _Site:
+    """A hosted site: the number of its start and the answers awaited, in order."""
+
+    slot: _Slot
+    run: int = 0
+    awaited: deque[asyncio.Future[bytes]] = field(default_factory=deque)
+
+    def fail(self, error: Exception) -> None:
+        """Let everyone who waits for this site know."""
+        while self.awaited:
+            answer = self.awaited.popleft()
+            if not answer.done():
+                answer.set_exception(error)
+
+
+class LocalEngine:
+    """Implements `engine.protocol.Engine` by child processes. A dead one is replaced."""
+
+    def __init__(
+        self, workers: int, *, publish_every_s: float = 0.5, mapper: str = SITE_MAPPER
+    ) -> None:
+        self._mapper = mapper
+        self._publish_every_s = publish_every_s
+        self._slots = [_Slot(number) for number in range(workers)]
+        self._sites: dict[int, _Site] = {}
+        self._listeners: list[ViewListener] = []
+        self._stopping = False
+
+    @property
+    def pids(self) -> list[int]:
+        """Process ids of the workers that run."""
+        running = [slot.process for slot in self._slots if slot.process is not None]
+        return [process.pid for process in running if process.pid is not None]
+
+    async def start(self) -> None:
+        """Spawn the workers."""
+        for slot in self._slots:
+            self._spawn(slot)
+
+    async def stop(self) -> None:
+        """Kill the workers."""
+        self._stopping = True
+        for slot in self._slots:
+            if slot.process is not None:
+                slot.process.kill()
+        for site in self._sites.values():
+            site.fail(WorkerDiedError(None, "the service is stopping", killed=True))
+
+    def subscribe(self, listener: ViewListener) -> None:
+        """Have `listener` told of published views."""
+        self._listeners.append(listener)
+
+    def not_ready(self) -> list[str]:
+        """Return which workers are not warm yet."""
+        return [
+            f"worker {slot.number} is warming up"
+            + (f" again: {slot.last_words}" if slot.last_words else "")
+            for slot in self._slots
+            if not slot.ready.is_set()
+        ]
+
+    async def start_site(self, site: int, position: int, snapshot: bytes | None) -> None:
+        """Host a site on the worker that has fewest, or on the one that has it already."""
+        hosted = self._sites.get(site)
+        if hosted is None:
+            slot = min(self._slots, key=lambda s: (len(s.sites), s.number))
+            slot.sites.add(site)
+            hosted = self._sites[site] = _Site(slot)
+        await hosted.slot.ready.wait()
+        hosted.fail(WorkerDiedError(None, "the site was started again", killed=False))
+        hosted.run += 1
+        await self._ask(hosted, StartSite(site, hosted.run, position, snapshot))
+
+    def feed(
+        self, site: int, entries: Sequence[LogEntry], through: int, *, caught_up: bool
+    ) -> Awaitable[bytes]:
+        """Send entries to the site's worker."""
+        hosted = self._sites[site]
+        return self._ask(hosted, Feed(site, hosted.run, tuple(entries), through, caught_up))
+
+    async def snapshot(self, site: int) -> bytes:
+        """Ask the site's worker for the mapper's state."""
+        hosted = self._sites[site]
+        return await self._ask(hosted, TakeSnapshot(site, hosted.run))
+
+    def stop_site(self, site: int) -> None:
+        """Host a site no longer."""
+        hosted = self._sites.pop(site, None)
+        if hosted is None:
+            return
+        hosted.slot.sites.discard(site)
+        hosted.fail(WorkerDiedError(None, "the site was stopped", killed=False))
+        if hosted.slot.process is not None:
+            hosted.slot.process.send(StopSite(site))
+
+    def _ask(self, hosted: _Site, order: StartSite | Feed | TakeSnapshot) -> asyncio.Future[bytes]:
+        """Send an order; its answer comes in turn, as a worker obeys in order."""
+        answer: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
+        # Who asked may have stopped waiting: then the exception is nobody's business.
+        answer.add_done_callback(lambda done: done.cancelled() or done.exception())
+        process = hosted.slot.process
+        if process is None or not process.ready:
+            answer.set_exception(WorkerDiedError(None, hosted.slot.last_words, killed=False))
+        else:
+            hosted.awaited.append(answer)
+            process.send(order)
+        return answer
+
+    def _spawn(self, slot: _Slot) -> None:
+        if self._stopping:
+            return
+        slot.process = WorkerProcess(
+            f"lineloom-worker-{slot.number}",
+            self._mapper,
+            self._publish_every_s,
+            on_report=lambda report: self._on_report(slot, report),
+            on_death=lambda: self._on_death(slot),
+        )
+
+    def _on_report(self, slot: _Slot, report: Report) -> None:
+        if isinstance(report, Ready):
+            slot.stillborn = 0
+            slot.ready.set()
+            return
+        hosted = self._sites.get(report.site)
+        if hosted is None or hosted.run != report.run:
+            return
+        if isinstance(report, View):
+            for listener in self._listeners:
+                listener(report.site, report.position, report.view)
+        elif isinstance(report, Failed):
+            hosted.fail(MapperFailedError(report.position, report.reason))
+        elif isinstance(report, Started) and report.failure is not None:
+            hosted.fail(RestoreFailedError(report.failure))
+        elif hosted.awaited:
+            _resolve(hosted.awaited.popleft(), report)
+
+    def _on_death(self, slot: _Slot) -> None:
+        process = slot.process
+        if self._stopping or process is None:
+            return
+        slot.last_words = process.last_words
+        _LOG.warning("worker %d (process %s): %s", slot.number, process.pid, slot.last_words)
+        slot.stillborn = 0 if process.ready else slot.stillborn + 1
+        slot.ready.clear()
+        slot.process = None
+        for site in slot.sites:
+            mine = process.blamed is not None and process.blamed[0] == site
+            position = process.blamed[1] if mine and process.blamed is not None else None
+            self._sites[site].fail(
+                WorkerDiedError(position, slot.last_words, killed=process.killed)
+            )
+        pause = min(_RESPAWN_LIMIT_S, _RESPAWN_S * 2**slot.stillborn) if slot.stillborn else 0.0
+        asyncio.get_running_loop().call_later(pause, self._spawn, slot)
+
+
+def _resolve(answer: asyncio.Future[bytes], report: Fed | Started | Snapshot) -> None:
+    if not answer.done():
+        answer.set_result(report.data if isinstance(report, Snapshot) else b"")

@@ -1,0 +1,74 @@
+"""The mapper as the engine sees it."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Protocol
+
+from lineloom_core.mapping.changes import Changes
+from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.scan import Mount, Scan
+
+from lineloom_service.store import LogEntry
+from lineloom_service.store.codec import decode_mount, decode_scan
+
+SITE_MAPPER = "lineloom_core.mapping.site_mapper:SiteMapper"
+"""Where the mapper is; by name, so that the API process need not import numba and gtsam."""
+
+
+class Mapper(Protocol):
+    """A deterministic state machine over a site's log entries."""
+
+    def add(self, robot: str, scan: Scan) -> Changes:
+        """Take a scan."""
+        ...
+
+    def set_mount(self, robot: str, mount: Mount) -> None:
+        """Take a robot's mount for the scans that follow."""
+        ...
+
+    def forget(self, robot: str) -> None:
+        """Remove a robot."""
+        ...
+
+    def view(self) -> SiteView:
+        """Return all that is known now."""
+        ...
+
+    def snapshot(self) -> bytes:
+        """Return the state."""
+        ...
+
+
+class MapperFactory(Protocol):
+    """The mapper's class."""
+
+    def __call__(self) -> Mapper:
+        """Make a mapper that knows nothing."""
+        ...
+
+    def restore(self, data: bytes) -> Mapper:
+        """Make one from a snapshot."""
+        ...
+
+
+def load_factory(path: str) -> MapperFactory:
+    """Import the mapper's class from `module:Class`."""
+    module, _, name = path.partition(":")
+    factory: MapperFactory = getattr(importlib.import_module(module), name)
+    return factory
+
+
+def apply(mapper: Mapper, entry: LogEntry) -> None:
+    """Feed one log entry."""
+    if entry.kind == "forget":
+        mapper.forget(entry.robot)
+        return
+    if entry.body is None:
+        raise ValueError(f"a {entry.kind} entry has no body")
+    if entry.kind == "mount":
+        mapper.set_mount(entry.robot, decode_mount(entry.body))
+        return
+    if entry.session is None or entry.seq is None:
+        raise ValueError("a scan entry has no session or seq")
+    mapper.add(entry.robot, decode_scan(entry.body, entry.session, entry.seq))

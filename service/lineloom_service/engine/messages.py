@@ -1,0 +1,106 @@
+"""What travels between the service and a worker.
+
+run: the number of the site's start that a message belongs to; answers from an earlier start are
+no longer of interest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from lineloom_core.mapping.site_view import SiteView
+
+from lineloom_service.store import LogEntry
+
+
+@dataclass(frozen=True, slots=True)
+class StartSite:
+    """Host a site."""
+
+    site: int
+    run: int
+    position: int
+    snapshot: bytes | None
+
+
+@dataclass(frozen=True, slots=True)
+class Feed:
+    """Map these entries; afterwards the site is at `through`."""
+
+    site: int
+    run: int
+    entries: tuple[LogEntry, ...]
+    through: int
+    caught_up: bool
+
+
+@dataclass(frozen=True, slots=True)
+class TakeSnapshot:
+    """Answer with the mapper's state."""
+
+    site: int
+    run: int
+
+
+@dataclass(frozen=True, slots=True)
+class StopSite:
+    """Host a site no longer."""
+
+    site: int
+
+
+Order = StartSite | Feed | TakeSnapshot | StopSite
+
+
+@dataclass(frozen=True, slots=True)
+class Ready:
+    """The worker is warm."""
+
+
+@dataclass(frozen=True, slots=True)
+class Started:
+    """The site is hosted. failure: why not."""
+
+    site: int
+    run: int
+    failure: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Fed:
+    """A feed is mapped."""
+
+    site: int
+    run: int
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """The site as it is after the entry at `position`."""
+
+    site: int
+    run: int
+    position: int
+    view: SiteView
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """The state after all that was fed."""
+
+    site: int
+    run: int
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Failed:
+    """The mapper raised; the worker has dropped the site."""
+
+    site: int
+    run: int
+    position: int
+    reason: str
+
+
+Report = Ready | Started | Fed | View | Snapshot | Failed

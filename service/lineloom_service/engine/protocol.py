@@ -1,0 +1,88 @@
+"""What the service needs of a place where mappers run, and nothing more."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Sequence
+from typing import Protocol
+
+from lineloom_core.mapping.site_view import SiteView
+
+from lineloom_service.store import LogEntry
+
+ViewListener = Callable[[int, int, SiteView], None]
+"""Called on the event loop with site id, position and the view after the entry at position."""
+
+
+class MapperFailedError(Exception):
+    """The mapper raised on the entry at `position`. The site has to be started again."""
+
+    def __init__(self, position: int, reason: str) -> None:
+        super().__init__(f"entry {position}: {reason}")
+        self.position = position
+        self.reason = reason
+
+
+class RestoreFailedError(Exception):
+    """A snapshot cannot be restored. The site has to be started from another, or from nothing."""
+
+
+class WorkerDiedError(Exception):
+    """The process that hosted the site is gone. The site has to be started again.
+
+    position: the site's entry that it was working on, None where it was not this site's turn.
+    killed: by SIGKILL, so somebody else (an operator, the kernel out of memory) ended it.
+    """
+
+    def __init__(self, position: int | None, reason: str, *, killed: bool) -> None:
+        super().__init__(reason)
+        self.position = position
+        self.reason = reason
+        self.killed = killed
+
+
+class Engine(Protocol):
+    """Hosts one mapper per site, each fed by one caller in the order of the log.
+
+    Every call about a site may raise WorkerDiedError.
+    """
+
+    async def start(self) -> None:
+        """Begin; it need not be ready yet."""
+        ...
+
+    async def stop(self) -> None:
+        """End at once. What is worth keeping was asked for by `snapshot`."""
+        ...
+
+    def subscribe(self, listener: ViewListener) -> None:
+        """Have `listener` told of published views."""
+        ...
+
+    def not_ready(self) -> list[str]:
+        """Return what is missing before mappers can run; empty when nothing is."""
+        ...
+
+    async def start_site(self, site: int, position: int, snapshot: bytes | None) -> None:
+        """Host a site from a snapshot taken after the entry at `position`, or from nothing.
+
+        Replaces the site's mapper where there is one. Raises RestoreFailedError.
+        """
+        ...
+
+    def feed(
+        self, site: int, entries: Sequence[LogEntry], through: int, *, caught_up: bool
+    ) -> Awaitable[object]:
+        """Send entries; what is returned is done when the mapper is through all of them.
+
+        through: the position after them, which may be that of an entry left out. caught_up: there
+        are no more for now. Several feeds may be under way. Raises MapperFailedError.
+        """
+        ...
+
+    async def snapshot(self, site: int) -> bytes:
+        """Return the mapper's state after all that was fed. Raises MapperFailedError."""
+        ...
+
+    def stop_site(self, site: int) -> None:
+        """Host a site no longer."""
+        ...

@@ -1,0 +1,207 @@
+"""One site's way from the log into the map: restore, feed, save, and what to do when it fails."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import Counter, deque
+from dataclasses import dataclass
+
+from lineloom_core.mapping.site_view import SiteView
+
+from lineloom_service.engine.protocol import (
+    Engine,
+    MapperFailedError,
+    RestoreFailedError,
+    WorkerDiedError,
+)
+from lineloom_service.store import LogEntry, SiteRecord, Skip, SnapshotRecord, Store, StoreError
+
+_LOG = logging.getLogger(__name__)
+
+_FEEDS_UNDER_WAY = 2
+"""One being mapped, the next one waiting at the worker's door."""
+
+_STRIKES = {"raised": 2, "crashed": 3, "killed": 10}
+"""An entry is skipped after so many failures without a success in between.
+
+Raising is deterministic, and the second time excludes a passing shortage. A crash is likely the
+entry's fault. SIGKILL most likely is not: an operator, or the kernel short of memory.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Published:
+    """What queries see: the view after the entry at `position`.
+
+    scans, skipped: how many of the scans among 1..position are in the map, and how many not.
+    """
+
+    position: int
+    scans: int
+    skipped: int
+    view: SiteView
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How much at a time, and how often saved; see Settings."""
+
+    chunk: int
+    snapshot_every: int
+    snapshot_idle_s: float
+
+
+class SiteRunner:
+    """Feeds one site for as long as its task runs."""
+
+    def __init__(
+        self, record: SiteRecord, store: Store, engine: Engine, pace: Pace, producer: str
+    ) -> None:
+        self.site = record.id
+        self.name = record.name
+        self.skips: dict[int, Skip] = {}
+        self.published: Published | None = None
+        self.restored = asyncio.Event()
+        self._end = record.position
+        self._store = store
+        self._engine = engine
+        self._pace = pace
+        self._producer = producer
+        self._wake = asyncio.Event()
+        self._strikes: Counter[int] = Counter()
+        self._sent = self._done = self._saved = 0
+        self._scans_sent = self._scans_done = 0
+        self._marks: dict[int, int] = {}
+        self._under_way: deque[tuple[asyncio.Future[object], int, int]] = deque()
+
+    def on_commit(self, record: SiteRecord) -> None:
+        """There may be more to feed."""
+        self._end = record.position
+        self._wake.set()
+
+    def on_view(self, position: int, view: SiteView) -> None:
+        """Take what the worker published; a replay does not take queries back in time."""
+        self.restored.set()
+        if self.published is not None and position < self.published.position:
+            return
+        scans = self._marks.get(position, self._scans_done)
+        skipped = sum(s.kind == "scan" for s in self.skips.values() if s.position <= position)
+        self.published = Published(position, scans, skipped, view)
+        self._marks = {at: n for at, n in self._marks.items() if at >= position}
+
+    async def run(self) -> None:
+        """Keep the site hosted and fed, whatever happens to its worker."""
+        while True:
+            try:
+                self.skips = {s.position: s for s in await self._store.skips(self.site)}
+                await self._host()
+            except MapperFailedError as failure:
+                await self._strike(failure.position, "raised", failure.reason)
+            except WorkerDiedError as death:
+                if death.position is not None:
+                    how = "killed" if death.killed else "crashed"
+                    await self._strike(death.position, how, death.reason)
+            except RestoreFailedError as failure:
+                await self._drop_snapshot(str(failure))
+            except StoreError:
+                _LOG.exception("site %s: the storage failed, trying again", self.name)
+                await asyncio.sleep(1.0)
+
+    async def save(self) -> None:
+        """Save a snapshot if anything was mapped since the last one. Nothing may be under way."""
+        if self._done == self._saved:
+            return
+        data = await self._engine.snapshot(self.site)
+        record = SnapshotRecord(self._done, self._scans_done, self._producer, data)
+        await self._store.save_snapshot(self.site, record)
+        self._saved = self._done
+
+    async def finish(self) -> None:
+        """After `run` was cancelled: wait for what is under way and save."""
+        await self._drain()
+        await self.save()
+
+    async def _host(self) -> None:
+        snapshot = await self._store.latest_snapshot(self.site, self._producer)
+        self._saved = 0 if snapshot is None else snapshot.position
+        self._scans_sent = self._scans_done = 0 if snapshot is None else snapshot.scans
+        self._sent = self._done = self._saved
+        self._marks = {self._done: self._scans_done}
+        self._under_way.clear()
+        await self._engine.start_site(
+            self.site, self._saved, None if snapshot is None else snapshot.data
+        )
+        while True:
+            self._wake.clear()
+            while self._sent < self._end and len(self._under_way) < _FEEDS_UNDER_WAY:
+                await self._send()
+            if self._under_way:
+                await self._await_one()
+            elif self._sent >= self._end:
+                await self._idle()
+            if self._done - self._saved >= self._pace.snapshot_every:
+                await self._drain()
+                await self.save()
+
+    async def _send(self) -> None:
+        entries = await self._store.read_feed(self.site, self._sent, self._pace.chunk)
+        if not entries:  # the site was deleted: its runner is about to be stopped
+            self._end = self._sent
+            return
+        wanted: list[LogEntry] = [e for e in entries if e.position not in self.skips]
+        self._sent = entries[-1].position
+        self._scans_sent += sum(entry.kind == "scan" for entry in wanted)
+        self._marks[self._sent] = self._scans_sent
+        answer = self._engine.feed(self.site, wanted, self._sent, caught_up=self._sent >= self._end)
+        self._under_way.append((asyncio.ensure_future(answer), self._sent, self._scans_sent))
+
+    async def _await_one(self) -> None:
+        answer, position, scans = self._under_way[0]
+        await asyncio.shield(answer)  # a cancelled runner may still `finish`
+        self._under_way.popleft()
+        self._done, self._scans_done = position, scans
+        for struck in [p for p in self._strikes if p <= position]:
+            del self._strikes[struck]
+
+    async def _drain(self) -> None:
+        while self._under_way:
+            await self._await_one()
+
+    async def _idle(self) -> None:
+        pause = None if self._done == self._saved else self._pace.snapshot_idle_s
+        try:
+            await asyncio.wait_for(self._wake.wait(), pause)
+        except TimeoutError:
+            await self.save()
+
+    async def _strike(self, position: int, how: str, reason: str) -> None:
+        self._strikes[position] += 1
+        _LOG.warning(
+            "site %s, entry %d: the mapper %s (%d): %s",
+            self.name,
+            position,
+            how,
+            self._strikes[position],
+            reason,
+        )
+        if self._strikes[position] < _STRIKES[how]:
+            return
+        if position <= 0:  # while restoring, not on an entry
+            del self._strikes[position]
+            await self._drop_snapshot(reason)
+            return
+        try:
+            await self._store.record_skip(self.site, position, reason)
+        except StoreError:
+            _LOG.exception("site %s: entry %d could not be skipped", self.name, position)
+            await asyncio.sleep(1.0)
+
+    async def _drop_snapshot(self, reason: str) -> None:
+        """Go back to the snapshot before, or to the log."""
+        if self._saved == 0:
+            _LOG.error("site %s: the mapper does not start: %s", self.name, reason)
+            await asyncio.sleep(5.0)
+            return
+        _LOG.error("site %s: snapshot %d is unreadable: %s", self.name, self._saved, reason)
+        await self._store.drop_snapshot(self.site, self._saved)

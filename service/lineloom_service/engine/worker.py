@@ -1,0 +1,216 @@
+"""A worker process: hosts the mappers of some sites, one log entry after another."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import signal
+import threading
+import time
+from collections.abc import MutableSequence
+from dataclasses import dataclass
+from multiprocessing import parent_process
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+from lineloom_service.engine.mapper import Mapper, MapperFactory, apply, load_factory
+from lineloom_service.engine.messages import (
+    Failed,
+    Fed,
+    Feed,
+    Order,
+    Ready,
+    Report,
+    Snapshot,
+    Started,
+    StartSite,
+    StopSite,
+    TakeSnapshot,
+    View,
+)
+
+_LOG = logging.getLogger(__name__)
+
+RESTORING = -1
+"""Stands for a position while a snapshot is restored."""
+
+_NICENESS = 5
+_CAUGHT_UP_PAUSE_S = 0.05
+_PUBLISHING_SHARE = 0.1
+"""At most this share of a worker's time goes into building and sending views of a site."""
+
+
+@dataclass(slots=True)
+class _Hosted:
+    """A site's mapper. due: when to publish, None where the view is up to date."""
+
+    run: int
+    mapper: Mapper
+    position: int
+    due: float | None = None
+    earliest: float = 0.0
+    pause: float = 0.0
+
+
+class Worker:
+    """Serves orders until the pipe closes.
+
+    current: shared with the service: site and position being worked on, so that it knows whom to
+    blame if this process dies.
+    """
+
+    def __init__(
+        self,
+        connection: Connection[Report, Order],
+        current: MutableSequence[int],
+        factory: MapperFactory,
+        publish_every_s: float,
+    ) -> None:
+        self._connection = connection
+        self._current = current
+        self._factory = factory
+        self._publish_every_s = publish_every_s
+        self._sites: dict[int, _Hosted] = {}
+
+    def serve(self) -> None:
+        """Take orders, and publish what is due between them."""
+        self._connection.send(Ready())
+        while True:
+            if self._connection.poll(self._pause()):
+                try:
+                    order = self._connection.recv()
+                except EOFError:
+                    return
+                self._obey(order)
+            self._publish_due()
+
+    def _pause(self) -> float | None:
+        due = [hosted.due for hosted in self._sites.values() if hosted.due is not None]
+        return max(0.0, min(due) - time.monotonic()) if due else None
+
+    def _obey(self, order: Order) -> None:
+        if isinstance(order, Feed):
+            self._feed(order)
+        elif isinstance(order, StartSite):
+            self._start(order)
+        elif isinstance(order, TakeSnapshot):
+            self._snapshot(order)
+        elif isinstance(order, StopSite):
+            self._sites.pop(order.site, None)
+
+    def _start(self, order: StartSite) -> None:
+        self._sites.pop(order.site, None)
+        self._mark(order.site, RESTORING)
+        try:
+            if order.snapshot is None:
+                mapper = self._factory()
+            else:
+                mapper = self._factory.restore(order.snapshot)
+        except Exception as error:
+            self._connection.send(Started(order.site, order.run, describe(error)))
+            return
+        finally:
+            self._mark(0, 0)
+        now = time.monotonic()
+        self._sites[order.site] = _Hosted(order.run, mapper, order.position, due=now)
+        self._connection.send(Started(order.site, order.run))
+
+    def _feed(self, order: Feed) -> None:
+        hosted = self._hosted(order)
+        if hosted is None:
+            return
+        for entry in order.entries:
+            self._mark(order.site, entry.position)
+            try:
+                apply(hosted.mapper, entry)
+            except Exception as error:
+                # Half of the entry may have been taken: this mapper is not to be used again.
+                del self._sites[order.site]
+                reason = describe(error)
+                self._connection.send(Failed(order.site, order.run, entry.position, reason))
+                return
+            finally:
+                self._mark(0, 0)
+        hosted.position = order.through
+        pause = _CAUGHT_UP_PAUSE_S if order.caught_up else self._publish_every_s
+        hosted.due = hosted.earliest + max(pause, hosted.pause)
+        self._connection.send(Fed(order.site, order.run))
+
+    def _snapshot(self, order: TakeSnapshot) -> None:
+        hosted = self._hosted(order)
+        if hosted is None:
+            return
+        try:
+            data = hosted.mapper.snapshot()
+        except Exception as error:
+            _LOG.exception("site %d: no snapshot", order.site)
+            del self._sites[order.site]
+            self._connection.send(Failed(order.site, order.run, hosted.position, describe(error)))
+            return
+        self._connection.send(Snapshot(order.site, order.run, data))
+
+    def _hosted(self, order: Feed | TakeSnapshot) -> _Hosted | None:
+        """Return the site's mapper, unless the order is meant for one that has failed since."""
+        hosted = self._sites.get(order.site)
+        return hosted if hosted is not None and hosted.run == order.run else None
+
+    def _publish_due(self) -> None:
+        now = time.monotonic()
+        for site, hosted in self._sites.items():
+            if hosted.due is not None and hosted.due <= now:
+                self._publish(site, hosted)
+
+    def _publish(self, site: int, hosted: _Hosted) -> None:
+        started = time.monotonic()
+        hosted.due = None
+        try:
+            view = hosted.mapper.view()
+        except Exception:
+            # The site stays at its last view, and is not idle: that is the truth.
+            _LOG.exception("site %d: no view after entry %d", site, hosted.position)
+        else:
+            self._connection.send(View(site, hosted.run, hosted.position, view))
+        hosted.earliest = time.monotonic()
+        hosted.pause = (hosted.earliest - started) / _PUBLISHING_SHARE
+
+    def _mark(self, site: int, position: int) -> None:
+        self._current[0] = site
+        self._current[1] = position
+
+
+def describe(error: BaseException) -> str:
+    """Return an exception as one short line."""
+    text = str(error).strip().splitlines()
+    return f"{type(error).__name__}: {text[0] if text else ''}"[:300].rstrip(": ")
+
+
+def run_worker(
+    connection: Connection[Report, Order], current: Any, mapper: str, publish_every_s: float
+) -> None:
+    """Be a worker process. Ends with the service, however that ends."""
+    # A Ctrl-C goes to the whole terminal group; the service decides when its workers end.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    with contextlib.suppress(OSError):
+        os.nice(_NICENESS)  # answers go before mapping
+    factory = load_factory(mapper)
+    _warm_up()
+    # The service has closed its end: nobody is left to report to.
+    with contextlib.suppress(BrokenPipeError, ConnectionResetError):
+        Worker(connection, current, factory, publish_every_s).serve()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(0)
+
+
+def _warm_up() -> None:
+    try:
+        from lineloom_core.warm_up import warm_up
+    except ModuleNotFoundError:
+        return
+    warm_up()

@@ -1,0 +1,179 @@
+"""A mapper for the service's own tests: quick, exact, and able to fail on demand.
+
+It keeps a chain of hashes over everything it was fed, so two runs that differ in one bit or one
+place in the order end in different views. Imported by worker processes under its plain name.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import os
+import pickle
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+from lineloom_core.geometry import Pose
+from lineloom_core.mapping.changes import Changes
+from lineloom_core.mapping.site_view import (
+    ComponentView,
+    ConstraintView,
+    KeyframeView,
+    MapLine,
+    RobotView,
+    SiteView,
+    TrajectoryView,
+)
+from lineloom_core.scan import Mount, Scan
+
+RAISES, CRASHES, RAISES_ONCE = 666.0, 667.0, 668.0
+"""Stamps of scans that make the mapper fail."""
+
+SECONDS_PER_SCAN = float(os.environ.get("FAKE_MAPPER_SECONDS", "0"))
+ONCE_FILE = os.environ.get("FAKE_MAPPER_ONCE", "")
+
+
+class FakeMapper:
+    """Each robot drives straight on: scan n is at x = n. All robots are one component, `c1`,
+    but those called `alone…`, which have their own.
+    """
+
+    def __init__(self) -> None:
+        self._chain = b""
+        self._version = 0
+        self._scans: dict[str, list[tuple[str, int, float]]] = {}
+        self._mounts: dict[str, Mount] = {}
+
+    def add(self, robot: str, scan: Scan) -> Changes:
+        if SECONDS_PER_SCAN:
+            time.sleep(SECONDS_PER_SCAN)
+        self._version += 1
+        self._link(robot, repr((scan.session, scan.seq, scan.stamp)), scan.ranges.tobytes())
+        if scan.stamp == RAISES:
+            raise ValueError("this scan is cursed")
+        if scan.stamp == CRASHES:
+            os.kill(os.getpid(), signal.SIGSEGV)
+        if scan.stamp == RAISES_ONCE and not Path(ONCE_FILE).exists():
+            Path(ONCE_FILE).touch()
+            raise MemoryError
+        self._scans.setdefault(robot, []).append((scan.session, scan.seq, scan.stamp))
+        return Changes(placed=True)
+
+    def set_mount(self, robot: str, mount: Mount) -> None:
+        self._version += 1
+        self._link(robot, repr(mount), b"")
+        self._mounts[robot] = mount
+
+    def forget(self, robot: str) -> None:
+        self._version += 1
+        self._link(robot, "forget", b"")
+        self._scans.pop(robot, None)
+
+    def view(self) -> SiteView:
+        keyframes = tuple(self._keyframes())
+        robots = tuple(sorted(self._scans))
+        components = sorted({_component(robot) for robot in robots})
+        return SiteView(
+            version=self._version,
+            robots={robot: self._robot(robot) for robot in robots},
+            components=tuple(
+                ComponentView(c, tuple(r for r in robots if _component(r) == c), 1)
+                for c in components
+            ),
+            merged_into={"c9": "c1"},
+            trajectories={robot: self._trajectory(robot) for robot in robots},
+            lines=tuple(self._lines(components)),
+            keyframes=keyframes,
+            constraints=tuple(self._constraints(keyframes)),
+        )
+
+    def snapshot(self) -> bytes:
+        return pickle.dumps(self.__dict__)
+
+    @classmethod
+    def restore(cls, data: bytes) -> FakeMapper:
+        mapper = cls()
+        mapper.__dict__.update(pickle.loads(data))
+        return mapper
+
+    def _link(self, *parts: str | bytes) -> None:
+        digest = hashlib.sha256(self._chain)
+        for part in parts:
+            digest.update(part.encode() if isinstance(part, str) else part)
+        self._chain = digest.digest()
+
+    def _robot(self, robot: str) -> RobotView:
+        session, seq, stamp = self._scans[robot][-1]
+        return RobotView(
+            robot=robot,
+            component=_component(robot),
+            pose=Pose(float(len(self._scans[robot])), 0.0, 0.0),
+            covariance=np.diag([0.01, 0.01, 0.001]),
+            state="tracking",
+            scans_processed=len(self._scans[robot]),
+            keyframes=1,
+            latest_stamp=stamp,
+            latest_session=session,
+            latest_seq=seq,
+        )
+
+    def _trajectory(self, robot: str) -> TrajectoryView:
+        scans = self._scans[robot]
+        return TrajectoryView(
+            session=tuple(s for s, _, _ in scans),
+            seq=np.array([n for _, n, _ in scans], dtype=np.int64),
+            stamp=np.array([t for _, _, t in scans]),
+            component=tuple(_component(robot) for _ in scans),
+            poses=np.array([[i + 1.0, 0.0, 0.0] for i in range(len(scans))]),
+        )
+
+    def _lines(self, components: list[str]) -> list[MapLine]:
+        chain = self._chain.hex()
+        return [
+            MapLine(f"{chain}-{c}-{i}", c, i, 0.0, i + 1.0, 0.0, 0.01, 3, ("r",), 0.0, 1.0)
+            for c in components
+            for i in range(3)
+        ]
+
+    def _keyframes(self) -> list[KeyframeView]:
+        return [
+            KeyframeView(i, robot, _component(robot), *self._scans[robot][-1], Pose(1.0, 0.0, 0.0))
+            for i, robot in enumerate(sorted(self._scans))
+        ]
+
+    def _constraints(self, keyframes: tuple[KeyframeView, ...]) -> list[ConstraintView]:
+        linked = [k for k in keyframes if k.component == "c1"]
+        accepted = [
+            ConstraintView(
+                id=f"k{a.id}-{b.id}",
+                kind="rendezvous",
+                state="accepted",
+                keyframe_a=a.id,
+                keyframe_b=b.id,
+                T_a_b=Pose(0.0, 0.0, 0.0),
+                information=np.eye(3),
+                reason="they met",
+                checks={"conflict": 0.02, "unknown": float("nan")},
+                residual=0.5,
+            )
+            for a, b in itertools.pairwise(linked)
+        ]
+        rejected = [
+            ConstraintView(
+                id="k-rejected",
+                kind="loop",
+                state="rejected",
+                keyframe_a=0,
+                keyframe_b=0,
+                T_a_b=Pose(0.0, 0.0, 0.0),
+                information=np.eye(3),
+                reason="conflict",
+            )
+        ]
+        return accepted + rejected if keyframes else []
+
+
+def _component(robot: str) -> str:
+    return f"c-{robot}" if robot.startswith("alone") else "c1"

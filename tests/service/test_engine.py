@@ -1,0 +1,276 @@
+"""Mapping survives its workers: killed, crashing, raising, restarted, the map is the same."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lineloom_core.geometry import Pose
+from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.scan import Mount, Scan
+from lineloom_service.engine import Conductor, LocalEngine, Published
+from lineloom_service.settings import Settings
+from lineloom_service.store import NewScan, SnapshotRecord, SqliteStore
+from lineloom_service.store.codec import decode_scan, encode_mount, encode_scan
+
+RAISES, CRASHES, RAISES_ONCE = 666.0, 667.0, 668.0
+FAKE = "fake_mapper:FakeMapper"
+
+
+def _scan(seq: int, stamp: float | None = None) -> NewScan:
+    rng = np.random.default_rng(seq)
+    scan = Scan.checked(
+        rng.uniform(0.5, 20.0, 20),
+        angle_min=-1.0,
+        angle_increment=0.1,
+        range_min=0.1,
+        range_max=30.0,
+        stamp=float(seq) if stamp is None else stamp,
+        seq=seq,
+    )
+    return NewScan("0", seq, encode_scan(scan))
+
+
+class System:
+    """Store, engine and conductor, as the service puts them together."""
+
+    def __init__(self, path: Path, **changes: object) -> None:
+        values: dict[str, object] = {
+            "data_dir": path,
+            "gap_window_s": 0.1,
+            "chunk": 8,
+            "publish_every_s": 0.05,
+            "snapshot_every": 50,
+            "snapshot_idle_s": 60.0,
+        }
+        self.settings = Settings.model_validate({**values, **changes})
+        self.store = SqliteStore(
+            self.settings.database_path, gap_window_s=self.settings.gap_window_s, max_held=100
+        )
+        self.engine = LocalEngine(1, publish_every_s=self.settings.publish_every_s, mapper=FAKE)
+        self.conductor = Conductor(self.store, self.engine, self.settings)
+
+    async def post(self, seqs: range, *, stamps: dict[int, float] | None = None) -> None:
+        scans = [_scan(seq, (stamps or {}).get(seq)) for seq in seqs]
+        await self.store.append_scans("site", "r", scans, processed=0, limit=10**9)
+
+    async def published(self) -> Published:
+        record = await self.store.site("site")
+        assert record is not None
+        return self.conductor.published(record.id)
+
+    async def until(self, done: Callable[[Published], bool]) -> Published:
+        for _ in range(2000):
+            published = await self.published()
+            if done(published):
+                return published
+            await asyncio.sleep(0.01)
+        raise AssertionError(f"never happened; last seen {published.position}")
+
+    async def caught_up(self) -> Published:
+        record = await self.store.site("site")
+        assert record is not None
+        end = record.position
+        return await self.until(lambda p: p.position >= end)
+
+
+@asynccontextmanager
+async def _running(path: Path, **changes: object) -> AsyncIterator[System]:
+    system = System(path, **changes)
+    await system.store.open()
+    await system.conductor.start()
+    try:
+        yield system
+    finally:
+        await system.conductor.stop()
+        await system.store.close()
+
+
+def _fingerprint(view: SiteView) -> tuple[int, tuple[str, ...]]:
+    return view.version, tuple(line.id for line in view.lines)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[int, tuple[str, ...]]:
+    """The view after scans 0..199 in a run that nothing happened to."""
+
+    async def run() -> tuple[int, tuple[str, ...]]:
+        async with _running(tmp_path_factory.mktemp("undisturbed")) as system:
+            await system.post(range(200))
+            return _fingerprint((await system.caught_up()).view)
+
+    return asyncio.run(run())
+
+
+def test_what_the_mapper_sees_is_what_was_posted() -> None:
+    ranges = np.array([1.0, 1.1, np.nan, np.inf, -np.inf, 29.999999999])
+    for values in (ranges, ranges.astype(np.float32).astype(np.float64)):
+        scan = Scan.checked(
+            values,
+            angle_min=-1.0,
+            angle_increment=0.1,
+            range_min=0.1,
+            range_max=30.0,
+            stamp=1.5,
+            seq=7,
+            session="s",
+            odometry=Pose(1.0, 2.0, 3.0),
+        )
+        again = decode_scan(encode_scan(scan), "s", 7)
+        np.testing.assert_array_equal(again.ranges, scan.ranges)
+        assert again.ranges.dtype == np.float64
+        assert again.ranges.flags.c_contiguous
+        assert (again.odometry, again.stamp, again.seq) == (Pose(1.0, 2.0, 3.0), 1.5, 7)
+
+
+async def test_a_killed_worker_is_replaced_and_the_map_is_the_same(
+    tmp_path: Path, undisturbed: tuple[int, tuple[str, ...]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FAKE_MAPPER_SECONDS", "0.004")
+    async with _running(tmp_path) as system:
+        await system.post(range(200))
+        for position in (20, 90, 150):
+            await system.until(lambda p, at=position: p.position >= at)  # type: ignore[misc]
+            os.kill(system.engine.pids[0], signal.SIGKILL)
+        published = await system.caught_up()
+        assert _fingerprint(published.view) == undisturbed
+        assert (published.scans, published.skipped) == (200, 0)
+        assert system.conductor.skips(1) == []
+
+
+async def test_queries_never_go_back_in_time_while_a_replay_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FAKE_MAPPER_SECONDS", "0.002")
+    async with _running(tmp_path, snapshot_every=1000) as system:
+        await system.post(range(100))
+        await system.caught_up()
+        os.kill(system.engine.pids[0], signal.SIGKILL)
+        await asyncio.sleep(0.1)
+        await system.post(range(100, 150))
+        seen: list[int] = []
+        while not seen or seen[-1] < 150:
+            seen.append((await system.published()).position)
+            await asyncio.sleep(0.01)
+        assert seen == sorted(seen)
+        assert seen[0] == 100
+
+
+async def test_a_restart_goes_on_from_the_snapshot(
+    tmp_path: Path, undisturbed: tuple[int, tuple[str, ...]]
+) -> None:
+    async with _running(tmp_path) as system:
+        await system.post(range(120))
+        await system.caught_up()
+    async with _running(tmp_path) as system:
+        published = await system.caught_up()
+        assert (published.position, published.scans) == (120, 120)
+        snapshot = await system.store.latest_snapshot(1, "0.1.0")
+        assert snapshot is not None
+        assert snapshot.position == 120  # saved when the first service stopped
+        await system.post(range(120, 200))
+        assert _fingerprint((await system.caught_up()).view) == undisturbed
+
+
+async def test_an_unreadable_snapshot_is_dropped_and_the_log_replayed(
+    tmp_path: Path, undisturbed: tuple[int, tuple[str, ...]]
+) -> None:
+    async with _running(tmp_path) as system:
+        await system.post(range(200))
+        await system.caught_up()
+        await system.store.save_snapshot(1, SnapshotRecord(200, 200, "0.1.0", b"rubbish"))
+    async with _running(tmp_path) as system:
+        assert _fingerprint((await system.caught_up()).view) == undisturbed
+
+
+async def test_a_scan_that_makes_the_mapper_raise_is_skipped_for_good(tmp_path: Path) -> None:
+    async with _running(tmp_path) as system:
+        await system.post(range(60), stamps={30: RAISES})
+        published = await system.caught_up()
+        assert (published.scans, published.skipped, published.view.version) == (59, 1, 59)
+        (skip,) = system.conductor.skips(1)
+        assert (skip.seq, skip.position) == (30, 31)
+        assert skip.reason == "ValueError: this scan is cursed"
+        before = _fingerprint(published.view)
+    async with _running(tmp_path) as system:
+        published = await system.caught_up()
+        assert _fingerprint(published.view) == before
+        assert (published.scans, published.skipped) == (59, 1)
+
+
+async def test_a_scan_that_crashes_the_worker_is_skipped_and_the_site_goes_on(
+    tmp_path: Path,
+) -> None:
+    async with _running(tmp_path) as system:
+        await system.post(range(40), stamps={7: CRASHES})
+        published = await system.caught_up()
+        assert (published.scans, published.skipped) == (39, 1)
+        (skip,) = system.conductor.skips(1)
+        assert skip.seq == 7
+        assert "SIGSEGV" in skip.reason
+
+
+async def test_a_failure_that_does_not_come_again_costs_no_scan(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FAKE_MAPPER_ONCE", str(tmp_path / "once"))
+    async with _running(tmp_path) as system:
+        await system.post(range(40), stamps={7: RAISES_ONCE})
+        published = await system.caught_up()
+        assert (published.scans, published.skipped) == (40, 0)
+        assert (tmp_path / "once").exists()
+
+
+async def test_mounts_and_forgetting_reach_the_mapper_in_order(tmp_path: Path) -> None:
+    async with _running(tmp_path) as system:
+        await system.store.set_mount("site", "r", encode_mount(Mount(Pose(0.1, 0.0, 0.0))))
+        await system.post(range(3))
+        view = (await system.caught_up()).view
+        assert view.version == 4
+        assert view.robots["r"].scans_processed == 3
+        await system.store.forget_robot("site", "r")
+        published = await system.caught_up()
+        assert published.view.robots == {}
+        assert (published.view.version, published.scans) == (5, 3)
+
+
+async def test_an_idle_site_is_saved(tmp_path: Path) -> None:
+    async with _running(tmp_path, snapshot_idle_s=0.1) as system:
+        await system.post(range(5))
+        await system.caught_up()
+        for _ in range(200):
+            if await system.store.latest_snapshot(1, "0.1.0"):
+                break
+            await asyncio.sleep(0.02)
+        snapshot = await system.store.latest_snapshot(1, "0.1.0")
+        assert snapshot is not None
+        assert (snapshot.position, snapshot.scans) == (5, 5)
+
+
+async def test_a_deleted_site_stops_being_mapped(tmp_path: Path) -> None:
+    async with _running(tmp_path) as system:
+        await system.post(range(20))
+        await system.caught_up()
+        assert await system.store.delete_site("site") == 1
+        await system.conductor.forget_site(1)
+        await system.post(range(3))
+        published = await system.caught_up()
+        assert (published.position, published.view.version) == (3, 3)
+
+
+async def test_workers_that_cannot_start_are_named_as_the_reason(tmp_path: Path) -> None:
+    engine = LocalEngine(1, mapper="no_such_module:Mapper")
+    await engine.start()
+    for _ in range(500):
+        reasons = engine.not_ready()
+        if reasons and "code 1" in reasons[0]:
+            break
+        await asyncio.sleep(0.02)
+    assert reasons == ["worker 0 is warming up again: the worker ended with code 1"]
+    await engine.stop()
