@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 def match_locally(reference: ScanLike, current: ScanLike) -> MatchAnswer | None:
     """Return the match, or None where the core is not installed."""
     try:
-        from lineloom_core.matching import match
+        from lineloom_core.matching.matcher import LineMatcher
     except ImportError:
         return None
-    return _answer(match(_core_scan(reference, "A"), _core_scan(current, "B")))
+    return _answer(LineMatcher().match(_core_scan(reference, "A"), _core_scan(current, "B")))
 
 
 def _core_scan(scan: ScanLike, name: str) -> Scan:
