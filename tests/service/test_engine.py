@@ -14,10 +14,13 @@ import pytest
 from lineloom_core.geometry import Pose
 from lineloom_core.mapping.site_view import SiteView
 from lineloom_core.scan import Mount, Scan
-from lineloom_service.engine import Conductor, LocalEngine, Published
+from lineloom_service.engine.conductor import Conductor
+from lineloom_service.engine.local_engine import LocalEngine
+from lineloom_service.engine.site_runner import Published
 from lineloom_service.settings import Settings
-from lineloom_service.store import NewScan, SnapshotRecord, SqliteStore
 from lineloom_service.store.codec import decode_scan, encode_mount, encode_scan
+from lineloom_service.store.records import NewScan, SnapshotRecord
+from lineloom_service.store.sqlite_store import SqliteStore
 
 RAISES, CRASHES, RAISES_ONCE = 666.0, 667.0, 668.0
 FAKE = "fake_mapper:FakeMapper"
@@ -53,7 +56,9 @@ class System:
         self.store = SqliteStore(
             self.settings.database_path, gap_window_s=self.settings.gap_window_s, max_held=100
         )
-        self.engine = LocalEngine(1, publish_every_s=self.settings.publish_every_s, mapper=FAKE)
+        self.engine = LocalEngine(
+            1, publish_every_s=self.settings.publish_every_s, mapper=FAKE, warm_up=None
+        )
         self.conductor = Conductor(self.store, self.engine, self.settings)
 
     async def post(self, seqs: range, *, stamps: dict[int, float] | None = None) -> None:

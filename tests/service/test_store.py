@@ -10,17 +10,17 @@ import pytest
 import sqlalchemy as sa
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
-from lineloom_service.store import (
+from lineloom_service.store import tables
+from lineloom_service.store.database import sqlite_engine
+from lineloom_service.store.migrate import downgrade, migrate
+from lineloom_service.store.records import (
     BacklogFullError,
     NewScan,
     SiteRecord,
     SnapshotRecord,
-    SqliteStore,
     StoreError,
-    tables,
 )
-from lineloom_service.store.database import sqlite_engine
-from lineloom_service.store.migrate import downgrade, migrate
+from lineloom_service.store.sqlite_store import SqliteStore
 
 NO_LIMIT = 10**9
 

@@ -1,23 +1,6 @@
-"""Mapping outside the API process: workers that host mappers, and who feeds them."""
+"""Mapping outside the API process.
 
-from lineloom_service.engine.conductor import Conductor
-from lineloom_service.engine.local_engine import LocalEngine
-from lineloom_service.engine.protocol import (
-    Engine,
-    MapperFailedError,
-    RestoreFailedError,
-    ViewListener,
-    WorkerDiedError,
-)
-from lineloom_service.engine.site_runner import Published
-
-__all__ = [
-    "Conductor",
-    "Engine",
-    "LocalEngine",
-    "MapperFailedError",
-    "Published",
-    "RestoreFailedError",
-    "ViewListener",
-    "WorkerDiedError",
-]
+`protocol` is what the service needs of a place where mappers run, `local_engine` the embedded one
+by child processes, `conductor` feeds either from the store. Nothing is imported here: a worker
+process loads `worker`, not the whole service.
+"""

@@ -12,7 +12,8 @@ from lineloom_core.mapping.site_view import SiteView
 from lineloom_service.engine.protocol import Engine
 from lineloom_service.engine.site_runner import Pace, Published, SiteRunner
 from lineloom_service.settings import Settings
-from lineloom_service.store import SiteRecord, Skip, Store
+from lineloom_service.store.protocol import Store
+from lineloom_service.store.records import SiteRecord, Skip
 
 _LOG = logging.getLogger(__name__)
 

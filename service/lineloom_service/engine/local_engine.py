@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Awaitable, Sequence
 from dataclasses import dataclass, field
 
-from lineloom_service.engine.mapper import SITE_MAPPER
+from lineloom_service.engine.mapper import SITE_MAPPER, WARM_UP
 from lineloom_service.engine.messages import (
     Failed,
     Fed,
@@ -29,7 +29,7 @@ from lineloom_service.engine.protocol import (
     WorkerDiedError,
 )
 from lineloom_service.engine.worker_process import WorkerProcess
-from lineloom_service.store import LogEntry
+from lineloom_service.store.records import LogEntry
 
 _LOG = logging.getLogger(__name__)
 _RESPAWN_S = 0.1
@@ -68,9 +68,15 @@ class LocalEngine:
     """Implements `engine.protocol.Engine` by child processes. A dead one is replaced."""
 
     def __init__(
-        self, workers: int, *, publish_every_s: float = 0.5, mapper: str = SITE_MAPPER
+        self,
+        workers: int,
+        *,
+        publish_every_s: float = 0.5,
+        mapper: str = SITE_MAPPER,
+        warm_up: str | None = WARM_UP,
     ) -> None:
         self._mapper = mapper
+        self._warm_up = warm_up
         self._publish_every_s = publish_every_s
         self._slots = [_Slot(number) for number in range(workers)]
         self._sites: dict[int, _Site] = {}
@@ -163,6 +169,7 @@ class LocalEngine:
         slot.process = WorkerProcess(
             f"lineloom-worker-{slot.number}",
             self._mapper,
+            self._warm_up,
             self._publish_every_s,
             on_report=lambda report: self._on_report(slot, report),
             on_death=lambda: self._on_death(slot),

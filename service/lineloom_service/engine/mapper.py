@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import importlib
-from typing import Protocol
+from typing import Any, Protocol
 
 from lineloom_core.mapping.changes import Changes
 from lineloom_core.mapping.site_view import SiteView
 from lineloom_core.scan import Mount, Scan
 
-from lineloom_service.store import LogEntry
 from lineloom_service.store.codec import decode_mount, decode_scan
+from lineloom_service.store.records import LogEntry
 
 SITE_MAPPER = "lineloom_core.mapping.site_mapper:SiteMapper"
-"""Where the mapper is; by name, so that the API process need not import numba and gtsam."""
+"""Where the mapper is; by name, so that the API process need not import gtsam."""
+
+WARM_UP = "lineloom_core.warm_up:warm_up"
+"""What a worker calls before it is ready: compiles the mapper's kernels."""
 
 
 class Mapper(Protocol):
@@ -52,11 +55,10 @@ class MapperFactory(Protocol):
         ...
 
 
-def load_factory(path: str) -> MapperFactory:
-    """Import the mapper's class from `module:Class`."""
+def load(path: str) -> Any:
+    """Import what `module:name` names."""
     module, _, name = path.partition(":")
-    factory: MapperFactory = getattr(importlib.import_module(module), name)
-    return factory
+    return getattr(importlib.import_module(module), name)
 
 
 def apply(mapper: Mapper, entry: LogEntry) -> None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from lineloom_core.mapping.site_view import SiteView
 
-from lineloom_service.store import LogEntry
+from lineloom_service.store.records import LogEntry
 
 
 @dataclass(frozen=True, slots=True)

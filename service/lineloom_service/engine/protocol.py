@@ -7,7 +7,7 @@ from typing import Protocol
 
 from lineloom_core.mapping.site_view import SiteView
 
-from lineloom_service.store import LogEntry
+from lineloom_service.store.records import LogEntry
 
 ViewListener = Callable[[int, int, SiteView], None]
 """Called on the event loop with site id, position and the view after the entry at position."""

@@ -15,7 +15,8 @@ from lineloom_service.engine.protocol import (
     RestoreFailedError,
     WorkerDiedError,
 )
-from lineloom_service.store import LogEntry, SiteRecord, Skip, SnapshotRecord, Store, StoreError
+from lineloom_service.store.protocol import Store
+from lineloom_service.store.records import LogEntry, SiteRecord, Skip, SnapshotRecord, StoreError
 
 _LOG = logging.getLogger(__name__)
 

@@ -14,7 +14,7 @@ from multiprocessing import parent_process
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
-from lineloom_service.engine.mapper import Mapper, MapperFactory, apply, load_factory
+from lineloom_service.engine.mapper import Mapper, MapperFactory, apply, load
 from lineloom_service.engine.messages import (
     Failed,
     Fed,
@@ -186,7 +186,11 @@ def describe(error: BaseException) -> str:
 
 
 def run_worker(
-    connection: Connection[Report, Order], current: Any, mapper: str, publish_every_s: float
+    connection: Connection[Report, Order],
+    current: Any,
+    mapper: str,
+    warm_up: str | None,
+    publish_every_s: float,
 ) -> None:
     """Be a worker process. Ends with the service, however that ends."""
     # A Ctrl-C goes to the whole terminal group; the service decides when its workers end.
@@ -194,8 +198,9 @@ def run_worker(
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with contextlib.suppress(OSError):
         os.nice(_NICENESS)  # answers go before mapping
-    factory = load_factory(mapper)
-    _warm_up()
+    factory = load(mapper)
+    if warm_up is not None:
+        load(warm_up)()
     # The service has closed its end: nobody is left to report to.
     with contextlib.suppress(BrokenPipeError, ConnectionResetError):
         Worker(connection, current, factory, publish_every_s).serve()
@@ -206,11 +211,3 @@ def _end_with_parent() -> None:
     if parent is not None:
         wait([parent.sentinel])
         os._exit(0)
-
-
-def _warm_up() -> None:
-    try:
-        from lineloom_core.warm_up import warm_up
-    except ModuleNotFoundError:
-        return
-    warm_up()

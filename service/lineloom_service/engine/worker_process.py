@@ -27,6 +27,7 @@ class WorkerProcess:
         self,
         name: str,
         mapper: str,
+        warm_up: str | None,
         publish_every_s: float,
         on_report: Callable[[Report], None],
         on_death: Callable[[], None],
@@ -41,7 +42,7 @@ class WorkerProcess:
         self._connection: Connection[Order, Report] = ours
         self._process = _SPAWN.Process(
             target=run_worker,
-            args=(theirs, self._current, mapper, publish_every_s),
+            args=(theirs, self._current, mapper, warm_up, publish_every_s),
             name=name,
             daemon=True,
         )

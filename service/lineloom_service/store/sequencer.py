@@ -57,11 +57,11 @@ class Stream:
             self.released = due[-1] if self.released is None else max(self.released, due[-1])
         return [self.held.pop(s)[0] for s in due]
 
-    def overdue(self, deadline: float, max_held: int) -> int | None:
+    def overdue(self, now: float, window_s: float, max_held: int) -> int | None:
         """Return the greatest seq that must not wait any longer, or None."""
         greatest: int | None = None
         for seq, (_, arrived) in self.held.items():
-            if arrived > deadline:
+            if arrived + window_s > now:
                 break
             greatest = seq if greatest is None else max(greatest, seq)
         if len(self.held) > max_held:
@@ -93,7 +93,7 @@ class Sequencer:
         released: list[int] = []
         waiting = [stream for stream in self.streams.values() if stream.held]
         for index, stream in enumerate(waiting):
-            overdue = stream.overdue(now - self._window_s, self._max_held)
+            overdue = stream.overdue(now, self._window_s, self._max_held)
             if overdue is not None:
                 for older in waiting[:index]:
                     released += older.pop_up_to(older.highest)
