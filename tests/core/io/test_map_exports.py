@@ -99,6 +99,44 @@ def test_wrong_questions_get_clear_answers(site_view: SiteView, render: object) 
         render(site_view, None, (0.0, 0.0, math.inf, 5.0))
 
 
+@pytest.mark.parametrize("count", [2, 9, 60])
+def test_many_components_and_robots_stay_on_the_page_and_apart(
+    site_view: SiteView, count: int
+) -> None:
+    """A robot that keeps getting lost leaves a row of small components behind."""
+    first, small = site_view.components
+    walls = [w for w in site_view.lines if w.component == small.id][:20]
+    extra = [replace(small, id=f"x{k}", robots=(f"robot-{k}",)) for k in range(count)]
+    robots = {
+        f"robot-{k}": replace(site_view.robots["carol"], component=None) for k in range(count)
+    }
+    view = replace(
+        site_view,
+        components=(first, *extra),
+        robots={**site_view.robots, **robots},
+        lines=site_view.lines
+        + tuple(replace(w, component=c.id, id=f"{c.id}-{w.id}") for c in extra for w in walls),
+    )
+    root = drawn(view)
+    width, height = float(root.get("width", 0)), float(root.get("height", 0))
+    frames = [
+        [float(r.get(k, 0)) for k in ("x", "y", "width", "height")]
+        for r in root.iter(f"{SVG}rect")
+        if r.get("fill") == "none"
+    ]
+    assert len(frames) == count + 1
+    for i, (x, y, w, h) in enumerate(frames):
+        assert x >= 0
+        assert y >= 0
+        assert x + w <= width
+        assert y + h <= height
+        for u, v, p, q in frames[:i]:
+            assert u + p <= x or x + w <= u or v + q <= y or y + h <= v
+    labels = [(float(t.get("x", 0)), float(t.get("y", 0))) for t in root.iter(f"{SVG}text")]
+    assert len(set(labels)) == len(labels)
+    assert all(y < height for _, y in labels)
+
+
 def test_hostile_names_stay_text(site_view: SiteView) -> None:
     component = replace(site_view.components[0], id='<script>&"', robots=("alice", "b<b>"))
     view = replace(site_view, components=(component,), lines=(), trajectories={}, robots={})
