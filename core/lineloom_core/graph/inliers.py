@@ -52,12 +52,11 @@ def select_inliers(
     pairwise test: 20 rounds of two iterations, about a second at 3,000 nodes.
     """
     every = [*edges, *candidates]
-    poses = dict(nodes)
     if not candidates:
-        return InlierTest((), {}, poses, 0)
+        return InlierTest((), {}, dict(nodes), 0)
+    poses = dict(nodes)
     weights = np.ones(len(candidates))
-    mu = 0.0
-    rounds = 0
+    mu, rounds = 0.0, 0
     for rounds in range(1, _MAX_ROUNDS + 1):  # noqa: B007
         everyone = [1.0] * len(edges) + [max(float(w), _LEAST_WEIGHT) for w in weights]
         poses = weighted_step(poses, every, everyone, anchor, _INNER_ITERATIONS)
@@ -73,11 +72,9 @@ def select_inliers(
             break
     poses = _settle(poses, every, len(edges), weights, anchor)
     chi2 = chi_squared(candidates, poses)
-    kept = tuple(
-        e.id for e, w, c in zip(candidates, weights, chi2, strict=True) if w > 0.5 and c <= chi2_max
-    )
-    figures = {e.id: float(c) for e, c in zip(candidates, chi2, strict=True)}
-    return InlierTest(kept, figures, poses, rounds)
+    ids = [e.id for e in candidates]
+    kept = tuple(np.array(ids)[(weights > 0.5) & (chi2 <= chi2_max)].tolist())
+    return InlierTest(kept, dict(zip(ids, chi2.tolist(), strict=True)), poses, rounds)
 
 
 def _settle(

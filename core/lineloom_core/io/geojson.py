@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from lineloom_core.io.selection import BBox, ComponentContent, select
-from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.site_view import MapLine, SiteView
 
 _NOTE = (
     "Coordinates are metres in the map frame of the feature's component, x forward, y left; "
@@ -41,24 +41,7 @@ def map_features(
 
 def _features(content: ComponentContent) -> list[dict[str, Any]]:
     component = content.component.id
-    walls = [
-        _feature(
-            "LineString",
-            [[line.x1, line.y1], [line.x2, line.y2]],
-            {
-                "kind": "wall",
-                "id": line.id,
-                "component": component,
-                "sigma": line.sigma,
-                "support": line.support,
-                "robots": list(line.robots),
-                "first_seen": line.first_seen,
-                "last_seen": line.last_seen,
-            },
-            line.id,
-        )
-        for line in content.lines
-    ]
+    walls = [_wall(line) for line in content.lines]
     paths = [
         _feature(
             "LineString",
@@ -80,6 +63,20 @@ def _features(content: ComponentContent) -> list[dict[str, Any]]:
         state = {"state": robot.state, "theta": robot.pose.theta}
         robots.append(_feature("Point", [robot.pose.x, robot.pose.y], where | state))
     return walls + paths + robots
+
+
+def _wall(line: MapLine) -> dict[str, Any]:
+    properties = {
+        "kind": "wall",
+        "id": line.id,
+        "component": line.component,
+        "sigma": line.sigma,
+        "support": line.support,
+        "robots": list(line.robots),
+        "first_seen": line.first_seen,
+        "last_seen": line.last_seen,
+    }
+    return _feature("LineString", [[line.x1, line.y1], [line.x2, line.y2]], properties, line.id)
 
 
 def _feature(
