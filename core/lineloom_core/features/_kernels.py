@@ -152,7 +152,7 @@ def prefix_moments(xy):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def fit_run(xy, s, a, b):  # type: ignore[no-untyped-def]
-    """Total least squares over points a..b: centroid, unit direction a -> b, spread across, along."""
+    """Total least squares over points a..b: centroid, direction a -> b, spread across, along."""
     m = b - a + 1
     mx, my = (s[b + 1, 0] - s[a, 0]) / m, (s[b + 1, 1] - s[a, 1]) / m
     sxx = (s[b + 1, 2] - s[a, 2]) - m * mx * mx
@@ -325,8 +325,18 @@ def classify_ends(lines, ranges, angle_min, angle_increment, sigma, full_turn, c
 
 @njit(cache=True)
 def extract(  # type: ignore[no-untyped-def]
-    ranges, angle_min, angle_increment, sigma, lam, split, merge_factor,
-    min_points, min_length, max_gap_beams, max_gap, corner_reach,
+    ranges,
+    angle_min,
+    angle_increment,
+    sigma,
+    lam,
+    split,
+    merge_factor,
+    min_points,
+    min_length,
+    max_gap_beams,
+    max_gap,
+    corner_reach,
 ):
     """All steps of §3 in one call: points, beams, chain ends, lines, end types, edge points."""
     xy, beam = to_points(ranges, angle_min, angle_increment)

@@ -12,7 +12,7 @@ from lineloom_core.mapping.constraint import Constraint, closure_information, tu
 from lineloom_core.mapping.keyframe import Keyframe
 from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.matching.free_space import judge_sweeps
-from lineloom_core.matching.local_map import LocalMap
+from lineloom_core.matching.local_map import Cloud, LocalMap
 
 
 def close_nearby(site: SiteMap, keyframe: int) -> Constraint | None:
@@ -85,7 +85,7 @@ def _register(site: SiteMap, older: int, newer: int) -> Constraint | None:
     )
 
 
-def _clouds_around(site: SiteMap, keyframe: Keyframe) -> list[tuple]:  # type: ignore[type-arg]
+def _clouds_around(site: SiteMap, keyframe: Keyframe) -> list[tuple[Cloud, Pose]]:
     T_keyframe_map = site.pose(keyframe.id).inverse()
     rows = []
     for k in site.neighbours_on_track(keyframe.id, 3):

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.graph import consistent_sets, pairwise_consistent, rigid_join
@@ -109,7 +110,7 @@ def _nearest_keyframes(
     return best[1], best[2], best[3]
 
 
-def _information_at(found: Recognition, current: Place, keyframe: int) -> np.ndarray:  # type: ignore[type-arg]
+def _information_at(found: Recognition, current: Place, keyframe: int) -> NDArray[np.float64]:
     """Move the information from the current place's anchor to one of its keyframes."""
     assert found.T_reference_current is not None
     at_anchor = turned(found.information, found.T_reference_current.theta)
@@ -235,7 +236,9 @@ def _drop_others(site: SiteMap, candidates: list[Constraint], chosen: list[Const
     for c in candidates:
         if c.id not in kept:
             stored = site.constraints[c.id]
-            site.add_constraint(stored.moved_to("rejected", "contradicts the set that was accepted"))
+            site.add_constraint(
+                stored.moved_to("rejected", "contradicts the set that was accepted")
+            )
 
 
 def _close_loops(site: SiteMap, place: Place) -> bool:

@@ -43,6 +43,3 @@ class Keyframe:
         state.pop("features", None)
         state.pop("cloud", None)
         return state
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)

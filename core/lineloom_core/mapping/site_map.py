@@ -103,6 +103,25 @@ class SiteMap:
         solution = optimize(nodes, edges, anchors=(min(nodes),))
         self.graph.set_poses(solution.poses)
 
+    def forget(self, robot: str) -> None:
+        """Remove a robot's keyframes, tracks and places, and every constraint that touches them."""
+        gone = {k.id for k in self.keyframes.values() if k.robot == robot}
+        for keyframe in sorted(gone):
+            self.graph.remove_node(keyframe)
+            del self.keyframes[keyframe]
+        self.tracks = {t.id: t for t in self.tracks.values() if t.robot != robot}
+        self.places = {p.id: p for p in self.places.values() if p.track in self.tracks}
+        self.constraints = {
+            c.id: c
+            for c in self.constraints.values()
+            if c.keyframe_a not in gone and c.keyframe_b not in gone
+        }
+        self.looped_tracks = {t: None for t in self.looped_tracks if t in self.tracks}
+        alive = {self.component_id(k) for k in self.keyframes}
+        self.merged_into = {
+            a: b for a, b in self.merged_into.items() if a not in alive and b in alive
+        }
+
     def nearby(self, keyframe: int, radius: float) -> list[tuple[int, float]]:
         """Keyframes of the same component within `radius` m, nearest first, with distances."""
         here = self.pose(keyframe)

@@ -37,6 +37,7 @@ from lineloom_core.places import Glimpse, Place
 from lineloom_core.scan import Mount, Scan
 
 SNAPSHOT_FORMAT = 1
+_CLOSURES_UNSOLVED = 6
 
 
 class SnapshotError(ValueError):
@@ -51,6 +52,7 @@ class SiteMapper:
         self._site = SiteMap(self._config)
         self._robots: dict[str, RobotRecord] = {}
         self._version = 0
+        self._unsolved = 0  # closures accepted since the graph was last solved
 
     @property
     def version(self) -> int:
@@ -95,26 +97,40 @@ class SiteMapper:
             record.tracker = None
         record.mount = mount
 
+    def forget(self, robot: str) -> None:
+        """Drop a robot with everything that rests on its scans."""
+        self._version += 1
+        if self._robots.pop(robot, None) is not None:
+            self._site.forget(robot)
+
     def view(self) -> SiteView:
         """Everything there is to know at this version; changes nothing."""
         return build_view(self._site, self._robots, self._version)
 
     def snapshot(self) -> bytes:
         """The whole state as bytes, for `restore`."""
-        state = (SNAPSHOT_FORMAT, self._config, self._site, self._robots, self._version)
+        state = (
+            SNAPSHOT_FORMAT,
+            self._config,
+            self._site,
+            self._robots,
+            self._version,
+            self._unsolved,
+        )
         return pickle.dumps(state, protocol=5)
 
     @classmethod
     def restore(cls, data: bytes) -> SiteMapper:
         """Go on from a snapshot. Raises SnapshotError where it cannot be read."""
         try:
-            form, config, site, robots, version = pickle.loads(data)
+            form, config, site, robots, version, unsolved = pickle.loads(data)
         except Exception as error:
             raise SnapshotError(f"unreadable snapshot: {error}") from error
         if form != SNAPSHOT_FORMAT:
             raise SnapshotError(f"snapshot of format {form}, expected {SNAPSHOT_FORMAT}")
         mapper = cls(config)
         mapper._site, mapper._robots, mapper._version = site, robots, version
+        mapper._unsolved = unsolved
         return mapper
 
     def _place(self, record: RobotRecord, scan: Scan, tracked: Tracked) -> Changes:
@@ -173,8 +189,14 @@ class SiteMapper:
     def _close_loops(self, track: Track, keyframe: int) -> bool:
         if len(track.keyframes) % self._config.closure.every:
             return False
-        if close_nearby(self._site, keyframe) is None:
+        closed = close_nearby(self._site, keyframe)
+        if closed is None:
             return False
+        self._unsolved += 1
+        step = closed.checks["moved_m"] + 2.0 * closed.checks["turned_rad"]
+        if step < 0.05 and self._unsolved < _CLOSURES_UNSOLVED:
+            return False  # says what the graph knew: it can wait for the next that does not
+        self._unsolved = 0
         self._site.optimise(keyframe)
         return True
 
@@ -195,14 +217,10 @@ class SiteMapper:
         return merges, moved
 
     def _make_place(self, track: Track) -> Place | None:
-        """A place of the last `span` metres of a track; its anchor is the keyframe in the middle."""
+        """A place of the last `span` metres of a track, anchored at its middle keyframe."""
         config = self._config.places
         start = track.travelled[-1] - config.span
-        members = [
-            k
-            for k, at in zip(track.keyframes, track.travelled, strict=True)
-            if at >= start
-        ]
+        members = [k for k, at in zip(track.keyframes, track.travelled, strict=True) if at >= start]
         while len(members) > config.most_keyframes:
             members = members[::2]
         if len(members) < config.least_keyframes:
@@ -239,9 +257,7 @@ class SiteMapper:
             surroundings = LocalMap.build(
                 (f.cloud, anchor.T_track_laser.between(f.T_track_laser)) for f in frames
             )
-            guess, _ = surroundings.search(
-                cloud, Pose.identity(), reach_xy=0.7, reach_theta=0.5
-            )
+            guess, _ = surroundings.search(cloud, Pose.identity(), reach_xy=0.7, reach_theta=0.5)
             found = surroundings.register(cloud, guess)
             if found.fit >= self._config.least_fit_late:
                 record.placed.append(

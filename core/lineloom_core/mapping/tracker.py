@@ -111,9 +111,7 @@ class Tracker:
         )
         if is_keyframe:
             self._add_keyframe(features, cloud)
-        return Tracked(
-            "tracked", found.pose, is_keyframe, _in_own_axes(found), found.fit, conflict
-        )
+        return Tracked("tracked", found.pose, is_keyframe, _in_own_axes(found), found.fit, conflict)
 
     def _predict(self, stamp: float, odometry: Pose | None) -> list[Pose]:
         """Where the robot may be: same velocity, and what its wheels say."""

@@ -86,9 +86,7 @@ def _covariance(site: SiteMap, keyframe: int) -> NDArray[np.float64]:
     return in_map_axes(covariances.of(keyframe), site.pose(keyframe))
 
 
-def _trajectory(
-    site: SiteMap, record: RobotRecord, component_of: dict[int, str]
-) -> TrajectoryView:
+def _trajectory(site: SiteMap, record: RobotRecord, component_of: dict[int, str]) -> TrajectoryView:
     placed = record.placed
     anchors = np.array([site.pose(p.keyframe).to_array() for p in placed]).reshape(-1, 3)
     steps = np.array([p.T_keyframe_laser.to_array() for p in placed]).reshape(-1, 3)
@@ -200,7 +198,10 @@ def _observations(site: SiteMap, keyframes: list[int], names: list[str]) -> Line
         robot=np.repeat(np.array([number[f.robot] for _, f, _ in rows], dtype=np.int64), counts),
         stamp=np.repeat(np.array([f.scan.stamp for _, f, _ in rows]), counts),
         id=np.concatenate(
-            [k * _LINES_PER_KEYFRAME + np.arange(len(lines), dtype=np.int64) for k, _, lines in rows]
+            [
+                k * _LINES_PER_KEYFRAME + np.arange(len(lines), dtype=np.int64)
+                for k, _, lines in rows
+            ]
         ),
     )
 

@@ -26,6 +26,7 @@ from lineloom_core.features._kernels import (
 
 BINS = 360
 LONG_ENOUGH = 3.0
+COARSE_STEP, FINE_STEP = 6, 2
 MATCHED, CONFLICT, OCCLUDED, OUTSIDE = 0, 1, 2, 3
 
 
@@ -44,7 +45,7 @@ def rotation_histogram(ref, cur):  # type: ignore[no-untyped-def]
         for j in range(cur.shape[0]):
             w = min(ref[i, LENGTH], cur[j, LENGTH], LONG_ENOUGH)
             d = (wrap_angle(ref[i, THETA] - cur[j, THETA]) + math.pi) * scale - 0.5
-            k = int(math.floor(d))
+            k = math.floor(d)
             f = d - k
             h[k % BINS] += w * (1.0 - f)
             h[(k + 1) % BINS] += w * f
@@ -157,7 +158,7 @@ def vote_translations(  # type: ignore[no-untyped-def]
                 ex = c * cur_edges[j, side, 0] - s * cur_edges[j, side, 1]
                 ey = s * cur_edges[j, side, 0] + c * cur_edges[j, side, 1]
                 tx, ty = ref_edges[i, side, 0] - ex, ref_edges[i, side, 1] - ey
-                gx, gy = int(math.floor((tx + half) / cell)), int(math.floor((ty + half) / cell))
+                gx, gy = math.floor((tx + half) / cell), math.floor((ty + half) / cell)
                 if 0 <= gx < n and 0 <= gy < n:
                     if grid[0, gx, gy] == 0.0:
                         touched[used, 0], touched[used, 1] = gx, gy
@@ -175,7 +176,7 @@ def vote_translations(  # type: ignore[no-untyped-def]
                 continue
             tx = (offs[p] * ny[q] - offs[q] * ny[p]) / sine
             ty = (nx[p] * offs[q] - nx[q] * offs[p]) / sine
-            gx, gy = int(math.floor((tx + half) / cell)), int(math.floor((ty + half) / cell))
+            gx, gy = math.floor((tx + half) / cell), math.floor((ty + half) / cell)
             if gx < 0 or gy < 0 or gx >= n or gy >= n:
                 continue
             op = overlap_length(ref[i], ny[p], -nx[p], ends[p, 0] + tx, ends[p, 1] + ty,
@@ -260,8 +261,19 @@ def explained_length(ref, cur, phi, pairs, count, tx, ty, reach, taken):  # type
 
 @njit(cache=True)
 def propose(  # type: ignore[no-untyped-def]
-    ref, ref_ends, ref_edges, cur, cur_ends, cur_edges,
-    rotations, cells, least_share, pair_limit, cell, half, reach,
+    ref,
+    ref_ends,
+    ref_edges,
+    cur,
+    cur_ends,
+    cur_edges,
+    rotations,
+    cells,
+    least_share,
+    pair_limit,
+    cell,
+    half,
+    reach,
 ):
     """Steps 1 to 3: rows x, y, theta, explained length, votes; best explained first."""
     phis = rotation_peaks(ref, cur, rotations, least_share, math.radians(3.0))
@@ -350,7 +362,10 @@ def accumulate_lines(  # type: ignore[no-untyped-def]
                 continue
             total += shared
             # The middle of the shared part, across the line.
-            px, py = ux * middle + nx * (ref[i, OFFSET] + e), uy * middle + ny * (ref[i, OFFSET] + e)
+            px, py = (
+                ux * middle + nx * (ref[i, OFFSET] + e),
+                uy * middle + ny * (ref[i, OFFSET] + e),
+            )
             mr = middle - 0.5 * (s1 + s2)
             mc = middle - 0.5 * (ta + tb)
             var = (ref[i, VAR_OFFSET] + cur[j, VAR_OFFSET] + 4e-5
@@ -407,7 +422,7 @@ def accumulate_lines(  # type: ignore[no-untyped-def]
 def refine(  # type: ignore[no-untyped-def]
     ref, ref_ends, ref_edges, cur, cur_ends, cur_edges, pose, H, iterations
 ):
-    """Step 4: Gauss-Newton on lines; gates shrink by 0.7. Moves `pose`, fills H; returns overlap."""
+    """Step 4: Gauss-Newton on lines, shrinking gates. Moves `pose`, fills H; returns overlap."""
     angle_gate, distance_gate = math.radians(7.0), 0.25
     total = 0.0
     g = np.zeros(3)
@@ -453,37 +468,47 @@ def bearing(y, x):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def judge_point(x, y, ranges, angle_min, angle_increment, turn, base, slope):  # type: ignore[no-untyped-def]
+def beam_of(x, y, angle_min, per_radian, turn):  # type: ignore[no-untyped-def]
+    """The beam nearest to the direction of (x, y); may be beyond the last one."""
+    f = (bearing(y, x) - angle_min) * per_radian + 0.5
+    if f < 0.0:
+        f += turn
+    elif f >= turn:
+        f -= turn
+    if f < 0.0 or f >= turn:  # angle_min more than a turn away
+        f -= turn * math.floor(f / turn)
+    return int(f)
+
+
+@njit(cache=True)
+def judge_point(x, y, ranges, angle_min, per_radian, turn, base, slope):  # type: ignore[no-untyped-def]
     """One point in the frame of one sweep: MATCHED, CONFLICT, OCCLUDED or OUTSIDE.
 
     A conflict is a point in front of what the beam measured; a beam without return proves nothing.
+    per_radian: beams per radian; turn: beams per full turn.
     """
     n = ranges.shape[0]
-    rho = math.sqrt(x * x + y * y)
-    f = (bearing(y, x) - angle_min) / angle_increment
-    f -= turn * math.floor((f + 0.5) / turn)
-    b = int(math.floor(f + 0.5))
+    b = beam_of(x, y, angle_min, per_radian, turn)
     if b >= n:
         return OUTSIDE
     r = ranges[b]
     if not math.isfinite(r):
         return OUTSIDE
+    rho = math.sqrt(x * x + y * y)
     tol = base + slope * rho
-    nearest = r
-    matched = abs(rho - r) <= tol
-    for d in (-1, 1):
-        q = b + d
-        if 0 <= q < n and math.isfinite(ranges[q]):
-            nearest = min(nearest, ranges[q])
-            # Between two neighbouring returns the surface is anywhere between their ranges.
-            if abs(ranges[q] - r) < 0.5 and (ranges[q] - rho) * (r - rho) <= 0.0:
-                matched = True
-            matched = matched or abs(rho - ranges[q]) <= tol
-    if matched:
+    if abs(rho - r) <= tol:
         return MATCHED
-    if rho < nearest - tol:
-        return CONFLICT
-    return OCCLUDED
+    nearest = r
+    for q in (b - 1, b + 1):
+        if 0 <= q < n:
+            p = ranges[q]
+            if not math.isfinite(p):
+                continue
+            # Between two neighbouring returns the surface is anywhere between their ranges.
+            if abs(rho - p) <= tol or (abs(p - r) < 0.5 and (p - rho) * (r - rho) <= 0.0):
+                return MATCHED
+            nearest = min(nearest, p)
+    return CONFLICT if rho < nearest - tol else OCCLUDED
 
 
 @njit(cache=True)
@@ -496,13 +521,14 @@ def judge_points(  # type: ignore[no-untyped-def]
     the spacing of neighbouring beams there, at most 5 cm, so that near clutter does not outvote.
     """
     c, s = math.cos(pose[2]), math.sin(pose[2])
-    turn = 2.0 * math.pi / angle_increment
+    per_radian = 1.0 / angle_increment
+    turn = 2.0 * math.pi * per_radian
     for k in range(0, points.shape[0], step):
         px, py = points[k, 0], points[k, 1]
         w = min(math.sqrt(px * px + py * py) * angle_increment, 0.05)
         x = c * px - s * py + pose[0]
         y = s * px + c * py + pose[1]
-        counts[judge_point(x, y, ranges, angle_min, angle_increment, turn, base, slope)] += w
+        counts[judge_point(x, y, ranges, angle_min, per_radian, turn, base, slope)] += w
 
 
 @njit(cache=True)
@@ -517,6 +543,8 @@ def judge_cloud(  # type: ignore[no-untyped-def]
     c, s = math.cos(pose[2]), math.sin(pose[2])
     sweeps = ranges.shape[0]
     cs, ss = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    per_radian = 1.0 / angle_increments
+    turns = 2.0 * math.pi * per_radian
     for k in range(0, points.shape[0], step):
         x = c * points[k, 0] - s * points[k, 1] + pose[0]
         y = s * points[k, 0] + c * points[k, 1] + pose[1]
@@ -525,7 +553,7 @@ def judge_cloud(  # type: ignore[no-untyped-def]
             dx, dy = x - poses[q, 0], y - poses[q, 1]
             verdict = judge_point(
                 cs[q] * dx + ss[q] * dy, cs[q] * dy - ss[q] * dx, ranges[q],
-                angle_mins[q], angle_increments[q], 2.0 * math.pi / angle_increments[q], base, slope,
+                angle_mins[q], per_radian[q], turns[q], base, slope,
             )  # fmt: skip
             if verdict == MATCHED:
                 hits += 1
@@ -554,8 +582,19 @@ def invert_pose(pose, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def judge_pair(  # type: ignore[no-untyped-def]
-    ref_points, ref_ranges, ref_min, ref_inc, cur_points, cur_ranges, cur_min, cur_inc,
-    pose, step, base, slope, counts,
+    ref_points,
+    ref_ranges,
+    ref_min,
+    ref_inc,
+    cur_points,
+    cur_ranges,
+    cur_min,
+    cur_inc,
+    pose,
+    step,
+    base,
+    slope,
+    counts,
 ):
     """Free-space check both ways between two single sweeps; counts (4,) is overwritten."""
     counts[:] = 0.0
@@ -567,10 +606,32 @@ def judge_pair(  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def match_sweeps(  # type: ignore[no-untyped-def]
-    ref, ref_ends, ref_edges, ref_points, ref_ranges, ref_min, ref_inc,
-    cur, cur_ends, cur_edges, cur_points, cur_ranges, cur_min, cur_inc,
-    rotations, cells, least_share, pair_limit, cell, half, reach,
-    coarse_keep, fine_keep, iterations, base, slope,
+    ref,
+    ref_ends,
+    ref_edges,
+    ref_points,
+    ref_ranges,
+    ref_min,
+    ref_inc,
+    cur,
+    cur_ends,
+    cur_edges,
+    cur_points,
+    cur_ranges,
+    cur_min,
+    cur_inc,
+    rotations,
+    cells,
+    least_share,
+    pair_limit,
+    cell,
+    half,
+    reach,
+    coarse_keep,
+    fine_keep,
+    iterations,
+    base,
+    slope,
 ):
     """Steps 1 to 6 on two sweeps.
 
@@ -587,9 +648,9 @@ def match_sweeps(  # type: ignore[no-untyped-def]
     for k in range(n):
         judge_pair(
             ref_points, ref_ranges, ref_min, ref_inc, cur_points, cur_ranges, cur_min, cur_inc,
-            proposals[k, :3], 5, base + 0.15, slope + 0.01, counts,
+            proposals[k, :3], COARSE_STEP, base + 0.15, slope + 0.01, counts,
         )  # fmt: skip
-        rank[k] = proposals[k, 3] + 5.0 * (counts[MATCHED] - 2.0 * counts[CONFLICT])
+        rank[k] = proposals[k, 3] + COARSE_STEP * (counts[MATCHED] - 2.0 * counts[CONFLICT])
     order = np.argsort(-rank, kind="mergesort")
     m = min(n, fine_keep)
     out = np.empty((m, 16))
@@ -609,11 +670,11 @@ def match_sweeps(  # type: ignore[no-untyped-def]
             continue
         judge_pair(
             ref_points, ref_ranges, ref_min, ref_inc, cur_points, cur_ranges, cur_min, cur_inc,
-            pose, 1, base, slope, counts,
+            pose, FINE_STEP, base, slope, counts,
         )  # fmt: skip
         out[kept, :3] = pose
         out[kept, 3], out[kept, 4] = row[3], row[4]
-        out[kept, 5:9] = counts
+        out[kept, 5:9] = FINE_STEP * counts
         out[kept, 9] = overlap
         out[kept, 10], out[kept, 11], out[kept, 12] = H[0, 0], H[0, 1], H[0, 2]
         out[kept, 13], out[kept, 14], out[kept, 15] = H[1, 1], H[1, 2], H[2, 2]
@@ -628,3 +689,29 @@ def match_sweeps(  # type: ignore[no-untyped-def]
 def evidence(row):  # type: ignore[no-untyped-def]
     """What speaks for a hypothesis, in metres of wall: overlap and matched, less conflicts."""
     return row[9] + row[5] - 3.0 * row[6]
+
+
+@njit(cache=True)
+def lying_pairs(ref, cur, pose, angle_gate, distance_gate, least_overlap):  # type: ignore[no-untyped-def]
+    """Rows i, j, overlap, distance, angle of the lines that lie on each other under `pose`."""
+    out = np.empty((ref.shape[0] * cur.shape[0], 5))
+    count = 0
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    for i in range(ref.shape[0]):
+        ux, uy = math.cos(ref[i, THETA]), math.sin(ref[i, THETA])
+        for j in range(cur.shape[0]):
+            angle = wrap_angle(cur[j, THETA] + pose[2] - ref[i, THETA])
+            if abs(angle) > angle_gate:
+                continue
+            ax = c * cur[j, X1] - s * cur[j, Y1] + pose[0]
+            ay = s * cur[j, X1] + c * cur[j, Y1] + pose[1]
+            bx = c * cur[j, X2] - s * cur[j, Y2] + pose[0]
+            by = s * cur[j, X2] + c * cur[j, Y2] + pose[1]
+            distance = abs(0.5 * (ux * (ay + by) - uy * (ax + bx)) - ref[i, OFFSET])
+            shared = overlap_length(ref[i], ux, uy, ax, ay, bx, by)
+            if distance > distance_gate or shared < least_overlap:
+                continue
+            out[count, 0], out[count, 1], out[count, 2] = i, j, shared
+            out[count, 3], out[count, 4] = distance, angle
+            count += 1
+    return out[:count]

@@ -1,8 +1,8 @@
 """Numba kernels of the local map. Slow twins: tests/core/matching/slow_twins.py.
 
-A local map is a grid of nx x ny cells of CELL metres with a corner at (ox, oy): `index` holds the row
-of `surface` in each cell or -1; a row of `surface` is mean x, mean y, normal x, normal y, weight.
-`field` is the same grid with 255 on a surface and less beside it.
+A local map is a grid of nx x ny cells of CELL metres with a corner at (ox, oy): `index` holds the
+row of `surface` in each cell or -1; a row of `surface` is mean x, mean y, normal x, normal y and
+weight. `field` is the same grid with 255 on a surface and less beside it.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def insert_points(index, surface, used, ox, oy, points, normals, pose, reach):  
         if px * px + py * py > reach * reach:
             continue
         x, y = c * px - s * py + pose[0], s * px + c * py + pose[1]
-        gx, gy = int(math.floor((x - ox) / CELL)), int(math.floor((y - oy) / CELL))
+        gx, gy = math.floor((x - ox) / CELL), math.floor((y - oy) / CELL)
         if gx < 0 or gy < 0 or gx >= nx_cells or gy >= ny_cells:
             continue
         nx = c * normals[k, 0] - s * normals[k, 1]
@@ -91,8 +91,8 @@ def fill_field(field, surface, used, ox, oy):  # type: ignore[no-untyped-def]
             d = math.hypot(a - 2, b - 2) * CELL
             stamp[a, b] = int(255.0 * math.exp(-0.5 * (d / 0.12) ** 2))
     for row in range(used):
-        gx = int(math.floor((surface[row, 0] - ox) / CELL))
-        gy = int(math.floor((surface[row, 1] - oy) / CELL))
+        gx = math.floor((surface[row, 0] - ox) / CELL)
+        gy = math.floor((surface[row, 1] - oy) / CELL)
         for a in range(max(gx - 2, 0), min(gx + 3, nx_cells)):
             for b in range(max(gy - 2, 0), min(gy + 3, ny_cells)):
                 field[a, b] = max(field[a, b], stamp[a - gx + 2, b - gy + 2])
@@ -100,7 +100,7 @@ def fill_field(field, surface, used, ox, oy):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def thin(points, spacing, most):  # type: ignore[no-untyped-def]
-    """Rows of `points` at least `spacing` from the one kept before; then every k-th up to `most`."""
+    """Rows at least `spacing` from the one kept before; of those every k-th, up to `most`."""
     n = points.shape[0]
     keep = np.empty(n, dtype=np.int64)
     m = 0
@@ -140,8 +140,8 @@ def correlate(field, ox, oy, points, guess, reach_xy, reach_theta, step_xy, step
     """
     n = points.shape[0]
     px, py = points[:, 0].copy(), points[:, 1].copy()
-    kt = int(math.ceil(reach_theta / step_theta))
-    kx = int(math.ceil(reach_xy / step_xy))
+    kt = math.ceil(reach_theta / step_theta)
+    kx = math.ceil(reach_xy / step_xy)
     best = np.array([guess[0], guess[1], guess[2], -1e9])
     if n == 0:
         return best
@@ -181,12 +181,12 @@ def register(  # type: ignore[no-untyped-def]
         g = np.zeros(3)
         matched = total = squares = 0.0
         c, s = math.cos(pose[2]), math.sin(pose[2])
-        rings = int(math.ceil(reach / CELL))
+        rings = math.ceil(reach / CELL)
         for k in range(points.shape[0]):
             rx = c * points[k, 0] - s * points[k, 1]
             ry = s * points[k, 0] + c * points[k, 1]
             x, y = rx + pose[0], ry + pose[1]
-            gx, gy = int(math.floor((x - ox) / CELL)), int(math.floor((y - oy) / CELL))
+            gx, gy = math.floor((x - ox) / CELL), math.floor((y - oy) / CELL)
             if gx < 0 or gy < 0 or gx >= nx_cells or gy >= ny_cells:
                 continue
             total += weights[k]
@@ -199,9 +199,10 @@ def register(  # type: ignore[no-untyped-def]
                     row = index[a, b]
                     if row < 0:
                         continue
-                    if has_normal and surface[row, 2] * nx + surface[row, 3] * ny < 0.7:
-                        if surface[row, 2] != 0.0 or surface[row, 3] != 0.0:
-                            continue
+                    known = surface[row, 2] != 0.0 or surface[row, 3] != 0.0
+                    facing = surface[row, 2] * nx + surface[row, 3] * ny
+                    if has_normal and known and facing < 0.7:
+                        continue
                     d2 = (surface[row, 0] - x) ** 2 + (surface[row, 1] - y) ** 2
                     if d2 < best:
                         best, where = d2, row

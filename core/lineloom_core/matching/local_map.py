@@ -40,8 +40,10 @@ class Cloud:
 
 @dataclass(frozen=True, eq=False)
 class LocalMap:
-    """A grid of averaged surface points with normals (see `_registration_kernels`), in some keyframe chain's
-    frame. Built anew when a keyframe is added: that is cheaper than forgetting old ones.
+    """A grid of averaged surface points with normals (see `_registration_kernels`).
+
+    In the frame of whoever builds it; built anew when a keyframe is added: that is cheaper than
+    forgetting old ones.
     """
 
     index: NDArray[np.int32]

@@ -56,3 +56,5 @@ class MatchResult:
     pairs: tuple[LinePair, ...] = ()
     checks: dict[str, float] = field(default_factory=dict)
     alternatives: tuple[Alternative, ...] = ()
+    best: Pose | None = None
+    """The best hypothesis, whatever the verdict: what `score` speaks of."""

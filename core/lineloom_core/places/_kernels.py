@@ -20,9 +20,21 @@ from lineloom_core.matching._kernels import (
 
 @njit(cache=True)
 def judge_places(  # type: ignore[no-untyped-def]
-    ref_points, ref_ranges, ref_mins, ref_incs, ref_poses,
-    cur_points, cur_ranges, cur_mins, cur_incs, cur_poses,
-    pose, step, base, slope, counts,
+    ref_points,
+    ref_ranges,
+    ref_mins,
+    ref_incs,
+    ref_poses,
+    cur_points,
+    cur_ranges,
+    cur_mins,
+    cur_incs,
+    cur_poses,
+    pose,
+    step,
+    base,
+    slope,
+    counts,
 ):
     """Free-space check both ways between two places; counts (4,) of points is overwritten."""
     counts[:] = 0.0
@@ -38,12 +50,40 @@ def judge_places(  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def match_places(  # type: ignore[no-untyped-def]
-    ref, ref_ends, ref_edges, ref_points, ref_ranges, ref_mins, ref_incs, ref_poses,
-    cur, cur_ends, cur_edges, cur_points, cur_ranges, cur_mins, cur_incs, cur_poses,
-    rotations, cells, least_share, pair_limit, cell, half, reach,
-    coarse_keep, fine_keep, iterations, base, slope,
+    ref,
+    ref_ends,
+    ref_edges,
+    ref_points,
+    ref_ranges,
+    ref_mins,
+    ref_incs,
+    ref_poses,
+    cur,
+    cur_ends,
+    cur_edges,
+    cur_points,
+    cur_ranges,
+    cur_mins,
+    cur_incs,
+    cur_poses,
+    rotations,
+    cells,
+    least_share,
+    pair_limit,
+    cell,
+    half,
+    reach,
+    least_explained,
+    coarse_keep,
+    fine_keep,
+    iterations,
+    base,
+    slope,
 ):
     """The matcher's steps 1 to 6 on fused lines and many sweeps.
+
+    A cascade: where the votes' best cell explains less than `least_explained` metres of line,
+    nothing dearer is tried.
 
     Returns refined hypotheses, best first, as rows
     x, y, theta, explained, votes, matched, conflict, occluded, outside, overlap.
@@ -52,6 +92,8 @@ def match_places(  # type: ignore[no-untyped-def]
         ref, ref_ends, ref_edges, cur, cur_ends, cur_edges,
         rotations, cells, least_share, pair_limit, cell, half, reach,
     )  # fmt: skip
+    if proposals.shape[0] == 0 or proposals[0, 3] < least_explained:
+        return np.empty((0, 10))
     n = min(proposals.shape[0], coarse_keep)
     counts = np.zeros(4)
     rank = np.empty(n)

@@ -60,7 +60,7 @@ class Place:
     sweep_poses: NDArray[np.float64]
 
     @staticmethod
-    def of(id: int, track: int, anchor: int, glimpses: Sequence[Glimpse]) -> Place:  # noqa: A002
+    def of(id: int, track: int, anchor: int, glimpses: Sequence[Glimpse]) -> Place:
         """Fuse the glimpses of consecutive keyframes of one track."""
         local_map = LocalMap.build(
             ((g.cloud, g.T_anchor_laser) for g in glimpses), reach=20.0, searchable=False

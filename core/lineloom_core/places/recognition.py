@@ -37,9 +37,10 @@ class RecognitionConfig:
     cell: float = 0.25
     rotations: int = 8
     cells: int = 12
-    pair_limit: int = 150
-    coarse_keep: int = 24
-    fine_keep: int = 5
+    pair_limit: int = 80
+    least_explained: float = 4.0
+    coarse_keep: int = 16
+    fine_keep: int = 4
     most_conflict: float = 0.1
     least_matched: float = 100.0
     least_overlap: float = 5.0
@@ -78,10 +79,11 @@ def recognise(
         current.lines, current.ends, current.edges, current.surface.points,
         current.ranges, current.angle_mins, current.angle_increments, current.sweep_poses,
         config.rotations, config.cells, 0.25, config.pair_limit, config.cell, config.half, 0.3,
-        config.coarse_keep, config.fine_keep, 4, TOLERANCE, TOLERANCE_SLOPE,
+        config.least_explained, config.coarse_keep, config.fine_keep, 4,
+        TOLERANCE, TOLERANCE_SLOPE,
     )  # fmt: skip
     if len(table) == 0:
-        return _refused("no hypothesis")
+        return _refused("too little in common")
     if _kernels.place_evidence(table[0, 5], table[0, 6], table[0, 9]) < config.least_overlap:
         return _refused("too little in common")
     registered = reference.local_map.register(
@@ -103,9 +105,7 @@ def recognise(
     )
 
 
-def check_alignment(
-    reference: Place, current: Place, registered: Registration
-) -> dict[str, float]:
+def check_alignment(reference: Place, current: Place, registered: Registration) -> dict[str, float]:
     """Free space both ways, fit and observability at a registered pose."""
     matched, conflict = count_points(reference, current, registered.pose)
     seen = observe(registered.information)
@@ -119,7 +119,9 @@ def check_alignment(
     }
 
 
-def count_points(reference: Place, current: Place, T_reference_current: Pose) -> tuple[float, float]:
+def count_points(
+    reference: Place, current: Place, T_reference_current: Pose
+) -> tuple[float, float]:
     """Points (cells of 0.1 m) that both places saw, and those in the other's free space."""
     counts = np.empty(4)
     _kernels.judge_places(

@@ -1,0 +1,88 @@
+"""Pairs of simulated scans with known relative pose, for calibration and benchmarks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lineloom_core.geometry import Pose
+from lineloom_core.scan import Scan
+from lineloom_core.simulation import FreeSpace, Lidar, World
+
+FAR_APART = 12.0
+"""Metres between the two scans of a negative pair, as in the real benchmark."""
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedPair:
+    """Two scans of one world; negative where they were taken far from each other."""
+
+    reference: Scan
+    current: Scan
+    T_reference_current: Pose
+    negative: bool
+
+
+def simulated_pairs(
+    world: World,
+    lidar: Lidar,
+    rng: np.random.Generator,
+    count: int,
+    *,
+    negative_share: float = 0.3,
+    reach: float = 4.0,
+    people: int = 0,
+) -> Iterator[SimulatedPair]:
+    """Yield `count` pairs; positives lie at most `reach` m apart, half of them turned by < 60 deg.
+
+    people: up to so many round things (people, chairs) stand around each scan, elsewhere in the
+    other: real places change between two visits.
+    """
+    space = FreeSpace.of(world)
+    while count > 0:
+        here = space.random_pose(rng)
+        negative = bool(rng.random() < negative_share)
+        there = _partner(space, here, rng, negative, reach)
+        if there is None:
+            continue
+        count -= 1
+        yield SimulatedPair(
+            lidar.scan(world, here, rng, disks=_bystanders(here, rng, people)),
+            lidar.scan(world, there, rng, disks=_bystanders(there, rng, people)),
+            here.between(there),
+            negative,
+        )
+
+
+def _partner(
+    space: FreeSpace, here: Pose, rng: np.random.Generator, negative: bool, reach: float
+) -> Pose | None:
+    for _ in range(100):
+        there = space.random_pose(rng)
+        distance = here.distance(there)
+        if negative and distance > FAR_APART:
+            return there
+        if not negative and distance < reach:
+            if rng.random() < 0.5:
+                turn = rng.uniform(-math.pi / 3, math.pi / 3)
+                there = Pose(there.x, there.y, here.theta + turn)
+            return there
+    return None
+
+
+def _bystanders(here: Pose, rng: np.random.Generator, most: int) -> NDArray[np.float64]:
+    """Disks (k, 3) x, y, radius around a pose, none closer than 0.6 m."""
+    count = int(rng.integers(0, most + 1))
+    distance = rng.uniform(0.6, 5.0, count)
+    bearing = rng.uniform(-math.pi, math.pi, count)
+    return np.column_stack(
+        [
+            here.x + distance * np.cos(bearing),
+            here.y + distance * np.sin(bearing),
+            rng.uniform(0.08, 0.3, count),
+        ]
+    )

@@ -1,0 +1,211 @@
+"""The default matcher: two scans, no pose, an honest answer (design §5).
+
+Steps: 1-3. rotations by the histogram of direction differences, translations by votes of line
+pairs, ranking by explained length; 4. refinement; 5. free space both ways; 6. observability;
+7. uniqueness; 8. calibrated score. Steps 1 to 5 run in one kernel (`_kernels.match_sweeps`).
+
+Beyond the thesis (chapters 4 and 5): directions are compared first and translations are voted
+for, instead of counting equal relations in a matching table; every hypothesis is verified
+against what both scans saw through, and the answer may be "weak" or "ambiguous".
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lineloom_core.features import ExtractionConfig, ScanFeatures, extract_features
+from lineloom_core.geometry import Pose, angle_difference
+from lineloom_core.matching import _kernels
+from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
+from lineloom_core.matching.result import Alternative, LinePair, MatchResult, Verdict
+from lineloom_core.matching.score import probability
+from lineloom_core.scan import Scan
+
+X, Y, ANGLE, EXPLAINED, VOTES, MATCHED, CONFLICT, OCCLUDED, OUTSIDE, OVERLAP = range(10)
+
+
+@dataclass(frozen=True, slots=True)
+class MatcherConfig:
+    """Parameters of the default matcher; metres, radians, shares 0..1.
+
+    rotations, least_share: peaks of the histogram kept, and the least height against the best.
+    cells, cell, half: translation cells kept per rotation, their size, greatest translation.
+    pair_limit: line pairs per rotation. reach: how far off a line explains another before
+    refinement. coarse_keep, fine_keep: hypotheses that see the coarse and the full free-space
+    check. weak_below: information [1/m^2] under which a direction is weak. rival_distance,
+    rival_angle: what counts as another place. least_margin: lead over the rival. most_conflict,
+    least_evidence: what a hypothesis must show to be one.
+    least_score: how sure a "match" must be.
+    """
+
+    rotations: int = 8
+    least_share: float = 0.25
+    cells: int = 12
+    pair_limit: int = 120
+    cell: float = 0.2
+    half: float = 10.0
+    reach: float = 0.25
+    coarse_keep: int = 24
+    fine_keep: int = 8
+    iterations: int = 4
+    weak_below: float = 300.0
+    rival_distance: float = 0.3
+    rival_angle: float = 0.15
+    least_margin: float = 0.15
+    most_conflict: float = 0.25
+    least_evidence: float = 3.0
+    least_score: float = 0.7
+    extraction: ExtractionConfig = field(default_factory=ExtractionConfig)
+
+
+class LineMatcher:
+    """Matches pairs of scans; holds nothing but its parameters."""
+
+    def __init__(self, config: MatcherConfig | None = None) -> None:
+        self.config = config or MatcherConfig()
+
+    def match(self, reference: Scan, current: Scan) -> MatchResult:
+        """Find T_reference_current of two scans without any initial guess."""
+        extraction = self.config.extraction
+        return self.match_features(
+            extract_features(reference, extraction), extract_features(current, extraction)
+        )
+
+    def match_features(self, reference: ScanFeatures, current: ScanFeatures) -> MatchResult:
+        """The same on features that have been extracted already."""
+        if len(reference) < 2 or len(current) < 2:
+            return _none("fewer than two line segments in a scan")
+        table = self._hypotheses(reference, current)
+        if len(table) == 0:
+            return _none("no rotation and translation that two line pairs agree on")
+        best = table[0]
+        pose = Pose.from_array(best[:3])
+        information = _information(best)
+        weak_direction, lambda_min = _weakness(information, self.config.weak_below)
+        rivals = self._rivals(table, pose, weak_direction)
+        checks = _checks(best, rivals, lambda_min)
+        score = probability(checks)
+        verdict, reason = self._verdict(checks, score, weak_direction)
+        return MatchResult(
+            verdict=verdict,
+            T_reference_current=None if verdict == "none" else pose,
+            weak_direction=weak_direction if verdict == "weak" else None,
+            covariance=None if verdict == "none" else _covariance(information),
+            score=score,
+            reason=reason,
+            best=pose,
+            pairs=line_pairs(reference, current, pose),
+            checks=checks,
+            alternatives=tuple(
+                Alternative(Pose.from_array(r[:3]), score * _ratio(r, best)) for r in rivals
+            ),
+        )
+
+    def _hypotheses(self, r: ScanFeatures, c: ScanFeatures) -> NDArray[np.float64]:
+        k = self.config
+        table: NDArray[np.float64] = _kernels.match_sweeps(
+            r.lines, r.ends, r.edges, r.points, r.ranges, r.angle_min, r.angle_increment,
+            c.lines, c.ends, c.edges, c.points, c.ranges, c.angle_min, c.angle_increment,
+            k.rotations, k.cells, k.least_share, k.pair_limit, k.cell, k.half, k.reach,
+            k.coarse_keep, k.fine_keep, k.iterations, TOLERANCE, TOLERANCE_SLOPE,
+        )  # fmt: skip
+        return table
+
+    def _rivals(
+        self, table: NDArray[np.float64], best: Pose, weak_direction: float | None
+    ) -> list[NDArray[np.float64]]:
+        """Hypotheses that are another place; a slide along a weak direction is the same one."""
+        found = []
+        for row in table[1:]:
+            dx, dy = row[X] - best.x, row[Y] - best.y
+            if weak_direction is None:
+                apart = math.hypot(dx, dy)
+            else:
+                apart = abs(dy * math.cos(weak_direction) - dx * math.sin(weak_direction))
+            turned = abs(angle_difference(row[ANGLE], best.theta))
+            if apart > self.config.rival_distance or turned > self.config.rival_angle:
+                found.append(row)
+        return found
+
+    def _verdict(
+        self, checks: dict[str, float], score: float, weak_direction: float | None
+    ) -> tuple[Verdict, str]:
+        config = self.config
+        if checks["evidence"] < config.least_evidence:
+            return "none", f"only {checks['evidence']:.1f} m of wall speak for the best hypothesis"
+        if checks["conflict_share"] > config.most_conflict:
+            share = 100.0 * checks["conflict_share"]
+            return "none", f"{share:.0f} % of what both saw contradicts the best hypothesis"
+        if checks["margin"] < config.least_margin:
+            return "ambiguous", "another hypothesis fits almost as well"
+        if weak_direction is not None:
+            return "weak", "nothing seen by both fixes the position along one direction"
+        if score < config.least_score:
+            return "none", f"the best hypothesis is right with a probability of only {score:.2f}"
+        return "match", "all checks passed"
+
+
+def line_pairs(reference: ScanFeatures, current: ScanFeatures, pose: Pose) -> tuple[LinePair, ...]:
+    """Line segments that lie on each other under `pose`, by extraction numbers."""
+    rows = _kernels.lying_pairs(
+        reference.lines, current.lines, pose.to_array(), math.radians(5.0), 0.12, 0.1
+    )
+    return tuple(LinePair(int(i), int(j), o, d, a) for i, j, o, d, a in rows.tolist())
+
+
+def _information(row: NDArray[np.float64]) -> NDArray[np.float64]:
+    a, b, c, d, e, f = row[10:16]
+    return np.array([[a, b, c], [b, d, e], [c, e, f]])
+
+
+def _weakness(information: NDArray[np.float64], weak_below: float) -> tuple[float | None, float]:
+    """Weak direction [rad, 0..pi) or None, and the least eigenvalue of the translation's Schur
+    complement [1/m^2].
+    """
+    (a, b, c), (_, d, e), (_, _, f) = information.tolist()
+    f = max(f, 1e-9)
+    xx, xy, yy = a - c * c / f, b - c * e / f, d - e * e / f
+    least = 0.5 * (xx + yy) - math.hypot(0.5 * (xx - yy), xy)
+    if least >= weak_below:
+        return None, least
+    strong = 0.5 * math.atan2(2.0 * xy, xx - yy)  # the axis of the greater eigenvalue
+    return (strong + 0.5 * math.pi) % math.pi, least
+
+
+def _covariance(information: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Inverse information; what nothing observes gets 10 m and 1 rad instead of infinity."""
+    floor = np.diag(np.array([0.01, 0.01, 1.0]))
+    return np.asarray(np.linalg.inv(information + floor), dtype=np.float64)
+
+
+def _checks(
+    best: NDArray[np.float64], rivals: list[NDArray[np.float64]], lambda_min: float
+) -> dict[str, float]:
+    evidence = float(_kernels.evidence(best))
+    rival = max((float(_kernels.evidence(r)) for r in rivals), default=0.0)
+    judged = max(float(best[MATCHED] + best[CONFLICT]), 1e-9)
+    seen = judged + float(best[OCCLUDED])
+    return {
+        "evidence": evidence,
+        "rival_evidence": max(rival, 0.0),
+        "margin": 1.0 - max(rival, 0.0) / evidence if evidence > 0.0 else 0.0,
+        "overlap_m": float(best[OVERLAP]),
+        "matched_m": float(best[MATCHED]),
+        "conflict_m": float(best[CONFLICT]),
+        "conflict_share": float(best[CONFLICT]) / judged,
+        "matched_share": float(best[MATCHED]) / seen,
+        "information": lambda_min,
+    }
+
+
+def _ratio(rival: NDArray[np.float64], best: NDArray[np.float64]) -> float:
+    top = float(_kernels.evidence(best))
+    return min(max(float(_kernels.evidence(rival)) / top, 0.0), 1.0) if top > 0.0 else 0.0
+
+
+def _none(reason: str) -> MatchResult:
+    return MatchResult("none", None, None, None, 0.0, reason)
