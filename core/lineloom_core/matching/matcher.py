@@ -68,15 +68,21 @@ class LineMatcher:
     def __init__(self, config: MatcherConfig | None = None) -> None:
         self.config = config or MatcherConfig()
 
+    @property
+    def name(self) -> str:
+        """Short name for tables."""
+        return "lineloom"
+
     def match(self, reference: Scan, current: Scan) -> MatchResult:
         """Find T_reference_current of two scans without any initial guess."""
-        extraction = self.config.extraction
-        return self.match_features(
-            extract_features(reference, extraction), extract_features(current, extraction)
-        )
+        return self.match_prepared(self.prepare(reference), self.prepare(current))
 
-    def match_features(self, reference: ScanFeatures, current: ScanFeatures) -> MatchResult:
-        """The same on features that have been extracted already."""
+    def prepare(self, scan: Scan) -> ScanFeatures:
+        """Extract the features of one scan."""
+        return extract_features(scan, self.config.extraction)
+
+    def match_prepared(self, reference: ScanFeatures, current: ScanFeatures) -> MatchResult:
+        """Match features that have been extracted already."""
         if len(reference) < 2 or len(current) < 2:
             return _none("fewer than two line segments in a scan")
         table = self._hypotheses(reference, current)
