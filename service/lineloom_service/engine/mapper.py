@@ -66,11 +66,10 @@ def apply(mapper: Mapper, entry: LogEntry) -> None:
     if entry.kind == "forget":
         mapper.forget(entry.robot)
         return
-    if entry.body is None:
-        raise ValueError(f"a {entry.kind} entry has no body")
     if entry.kind == "mount":
-        mapper.set_mount(entry.robot, decode_mount(entry.body))
+        mount = Mount() if entry.body is None else decode_mount(entry.body)
+        mapper.set_mount(entry.robot, mount)
         return
-    if entry.session is None or entry.seq is None:
-        raise ValueError("a scan entry has no session or seq")
+    if entry.body is None or entry.session is None or entry.seq is None:
+        raise ValueError("a scan entry has no body, session or seq")
     mapper.add(entry.robot, decode_scan(entry.body, entry.session, entry.seq))

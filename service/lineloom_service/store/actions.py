@@ -63,7 +63,7 @@ def _check_backlog(site: SiteLedger | None, coming: int, processed: int, limit: 
         raise BacklogFullError(pending, limit)
 
 
-def set_mount(tx: Transaction, site_name: str, robot_name: str, mount: bytes) -> None:
+def set_mount(tx: Transaction, site_name: str, robot_name: str, mount: bytes | None) -> None:
     """Log a mount. What was accepted before is released first: it was taken with the old one."""
     site = tx.site(site_name)
     robot = tx.robot(site, robot_name)

@@ -47,8 +47,11 @@ class Store(Protocol):
         """
         ...
 
-    async def set_mount(self, site: str, robot: str, mount: bytes) -> None:
-        """Log the robot's mount for the scans that follow; the same again changes nothing."""
+    async def set_mount(self, site: str, robot: str, mount: bytes | None) -> None:
+        """Log the robot's mount (None: none) for the scans that follow, creating the robot.
+
+        The same again changes nothing.
+        """
         ...
 
     async def forget_robot(self, site: str, robot: str) -> bool:

@@ -98,7 +98,7 @@ class SqliteStore:
 
         return await self._write(action)
 
-    async def set_mount(self, site: str, robot: str, mount: bytes) -> None:
+    async def set_mount(self, site: str, robot: str, mount: bytes | None) -> None:
         """Log a robot's mount."""
         await self._write(partial(actions.set_mount, site_name=site, robot_name=robot, mount=mount))
 

@@ -1,0 +1,284 @@
+"""Between the contract's models and the core's types: the only file that knows both."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+from lineloom import wire
+from lineloom.wire.base import Covariance
+from lineloom_core.geometry import Pose
+from lineloom_core.io.selection import ComponentContent
+from lineloom_core.mapping.site_view import ConstraintView, MapLine, RobotView, SiteView
+from lineloom_core.matching import MatchResult
+from lineloom_core.scan import Mount, Scan
+from numpy.typing import NDArray
+
+from lineloom_service.engine.site_runner import Published
+from lineloom_service.relative_pose import RelativePose
+from lineloom_service.store.codec import decode_mount
+from lineloom_service.store.records import RobotRecord, SiteRecord, Skip
+
+
+def to_scan(scan: wire.Scan) -> Scan:
+    """Return the core's scan. Raises InvalidScanError where the fields do not fit together."""
+    odometry = scan.odometry
+    return Scan.checked(
+        # A list as it came, or an array of float32: numpy takes either.
+        np.asarray(scan.ranges, dtype=np.float64),
+        angle_min=scan.angle_min,
+        angle_increment=scan.angle_increment,
+        angle_max=scan.angle_max,
+        range_min=scan.range_min,
+        range_max=scan.range_max,
+        stamp=scan.stamp,
+        seq=scan.seq,
+        session=scan.session,
+        time_increment=scan.time_increment,
+        scan_time=scan.scan_time,
+        odometry=None if odometry is None else Pose(odometry.x, odometry.y, odometry.theta),
+    )
+
+
+def to_mount(mount: wire.MountSettings) -> Mount:
+    """Return the core's mount."""
+    return Mount(Pose(mount.x, mount.y, mount.theta), mount.inverted)
+
+
+def to_site(record: SiteRecord, published: Published) -> wire.Site:
+    """Return how a site is doing."""
+    view = published.view
+    constraints: dict[str, dict[str, int]] = {}
+    for (kind, state), count in Counter((c.kind, c.state) for c in view.constraints).items():
+        constraints.setdefault(kind, {})[state] = count
+    counts = _counts(record.accepted, published.scans, published.skipped)
+    return wire.Site(
+        site=record.name,
+        version=view.version,
+        idle=counts.pending == 0 and published.position >= record.position,
+        scans=counts,
+        robots=sorted(record.robots),
+        components=[
+            wire.Component(id=c.id, robots=list(c.robots), keyframes=c.keyframes)
+            for c in view.components
+        ],
+        merged_into=dict(view.merged_into),
+        constraints=constraints,
+    )
+
+
+def to_robot(site: str, record: RobotRecord, view: SiteView, skips: Iterable[Skip]) -> wire.Robot:
+    """Return a robot at its latest processed scan."""
+    skipped = [skip for skip in skips if skip.robot == record.name]
+    seen = view.robots.get(record.name)
+    processed = 0 if seen is None else seen.scans_processed
+    skipped_scans = sum(skip.kind == "scan" for skip in skipped)
+    health = [] if seen is None else list(seen.health)
+    if record.held:
+        health.append(f"{record.held} scans wait for those with lower seq")
+    health += [_describe_skip(skip) for skip in skipped]
+    return wire.Robot(
+        robot=record.name,
+        site=site,
+        component=None if seen is None else seen.component,
+        pose=None if seen is None else _uncertain_pose(seen),
+        state="starting" if seen is None else seen.state,
+        scans=_counts(record.accepted, processed, skipped_scans),
+        keyframes=0 if seen is None else seen.keyframes,
+        latest_stamp=None if seen is None else seen.latest_stamp,
+        latest_session=None if seen is None else seen.latest_session,
+        latest_seq=None if seen is None else seen.latest_seq,
+        mount=None if record.mount is None else _mount(decode_mount(record.mount)),
+        health=health,
+    )
+
+
+def to_trajectory(robot: str, view: SiteView) -> wire.Trajectory:
+    """Return every processed scan's pose."""
+    found = view.trajectories.get(robot)
+    poses: list[wire.TrajectoryPose] = []
+    if found is not None:
+        rows = zip(
+            found.session,
+            found.seq.tolist(),
+            found.stamp.tolist(),
+            found.component,
+            found.poses.tolist(),
+            strict=True,
+        )
+        poses = [
+            wire.TrajectoryPose.model_construct(
+                session=session, seq=seq, stamp=stamp, component=component, x=x, y=y, theta=theta
+            )
+            for session, seq, stamp, component, (x, y, theta) in rows
+        ]
+    return wire.Trajectory.model_construct(robot=robot, version=view.version, poses=poses)
+
+
+def to_map(site: str, view: SiteView, contents: Iterable[ComponentContent]) -> wire.MapAnswer:
+    """Return the lines of the components chosen."""
+    chosen = list(contents)
+    return wire.MapAnswer.model_construct(
+        site=site,
+        version=view.version,
+        components=[
+            wire.MapComponent(id=c.component.id, robots=list(c.component.robots)) for c in chosen
+        ],
+        lines=[_line(line) for content in chosen for line in content.lines],
+    )
+
+
+def to_graph(site: str, view: SiteView) -> wire.Graph:
+    """Return keyframes and accepted constraints."""
+    nodes = [
+        wire.GraphNode(
+            id=k.id,
+            robot=k.robot,
+            component=k.component,
+            session=k.session,
+            seq=k.seq,
+            stamp=k.stamp,
+            x=k.pose.x,
+            y=k.pose.y,
+            theta=k.pose.theta,
+        )
+        for k in view.keyframes
+    ]
+    edges = [
+        wire.GraphEdge(
+            source=c.keyframe_a,
+            target=c.keyframe_b,
+            key=c.id,
+            kind=c.kind,
+            state=c.state,
+            x=c.T_a_b.x,
+            y=c.T_a_b.y,
+            theta=c.T_a_b.theta,
+            information=_matrix(c.information),
+            residual=c.residual,
+        )
+        for c in view.constraints
+        if c.state == "accepted"
+    ]
+    summary = wire.GraphSummary(site=site, version=view.version)
+    return wire.Graph(graph=summary, nodes=nodes, edges=edges)
+
+
+def to_constraint(constraint: ConstraintView, robots: Mapping[int, str]) -> wire.Constraint:
+    """Return a constraint with its evidence. robots: the robot of each keyframe."""
+    return wire.Constraint(
+        id=constraint.id,
+        kind=constraint.kind,
+        state=constraint.state,
+        keyframe_a=constraint.keyframe_a,
+        keyframe_b=constraint.keyframe_b,
+        robot_a=robots.get(constraint.keyframe_a),
+        robot_b=robots.get(constraint.keyframe_b),
+        T_a_b=_pose(constraint.T_a_b),
+        information=_matrix(constraint.information),
+        reason=constraint.reason,
+        checks=_figures(constraint.checks),
+        consistency_set=list(constraint.consistency_set),
+        residual=constraint.residual,
+    )
+
+
+def to_transform(robot_a: str, robot_b: str, view: SiteView, found: RelativePose) -> wire.Transform:
+    """Return where one robot is, seen from another."""
+    return wire.Transform(
+        robot_a=robot_a,
+        robot_b=robot_b,
+        component=found.component,
+        version=view.version,
+        T_a_b=_pose(found.T_a_b),
+        covariance=None if found.covariance is None else _matrix(found.covariance),
+        constraints=list(found.constraints),
+    )
+
+
+def to_match(result: MatchResult) -> wire.MatchAnswer:
+    """Return what is known about T_reference_current."""
+    T = result.T_reference_current
+    return wire.MatchAnswer(
+        verdict=result.verdict,
+        T_reference_current=None if T is None else _pose(T),
+        weak_direction=result.weak_direction,
+        covariance=None if result.covariance is None else _matrix(result.covariance),
+        score=result.score,
+        pairs=[
+            wire.LinePair(
+                reference=p.reference,
+                current=p.current,
+                overlap=p.overlap,
+                distance=p.distance,
+                angle=p.angle,
+            )
+            for p in result.pairs
+        ],
+        checks=_figures(result.checks),
+        alternatives=[
+            wire.Alternative(
+                x=a.T_reference_current.x,
+                y=a.T_reference_current.y,
+                theta=a.T_reference_current.theta,
+                score=a.score,
+            )
+            for a in result.alternatives
+        ],
+        reason=result.reason,
+    )
+
+
+def _counts(accepted: int, processed: int, skipped: int) -> wire.ScanCounts:
+    # A robot that was forgotten and came back may still be shown with its former scans.
+    pending = max(0, accepted - processed - skipped)
+    return wire.ScanCounts(accepted=accepted, processed=processed, skipped=skipped, pending=pending)
+
+
+def _describe_skip(skip: Skip) -> str:
+    what = f"scan {skip.seq} of session {skip.session!r}" if skip.kind == "scan" else skip.kind
+    return f"{what} was left out of the map: {skip.reason}"
+
+
+def _pose(pose: Pose) -> wire.PoseAnswer:
+    return wire.PoseAnswer(x=pose.x, y=pose.y, theta=pose.theta)
+
+
+def _uncertain_pose(robot: RobotView) -> wire.UncertainPose | None:
+    if robot.pose is None:
+        return None
+    covariance = None if robot.covariance is None else _matrix(robot.covariance)
+    pose = robot.pose
+    return wire.UncertainPose(x=pose.x, y=pose.y, theta=pose.theta, covariance=covariance)
+
+
+def _mount(mount: Mount) -> wire.MountSettings:
+    T = mount.T_base_laser
+    return wire.MountSettings(x=T.x, y=T.y, theta=T.theta, inverted=mount.inverted)
+
+
+def _line(line: MapLine) -> wire.Line:
+    return wire.Line.model_construct(
+        id=line.id,
+        component=line.component,
+        x1=line.x1,
+        y1=line.y1,
+        x2=line.x2,
+        y2=line.y2,
+        sigma=line.sigma,
+        support=line.support,
+        robots=list(line.robots),
+        first_seen=line.first_seen,
+        last_seen=line.last_seen,
+    )
+
+
+def _matrix(matrix: NDArray[np.float64]) -> Covariance:
+    rows: list[list[float]] = matrix.tolist()
+    return [[value if math.isfinite(value) else None for value in row] for row in rows]
+
+
+def _figures(checks: Mapping[str, float]) -> dict[str, float | None]:
+    return {name: float(value) if math.isfinite(value) else None for name, value in checks.items()}

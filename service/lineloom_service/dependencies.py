@@ -1,0 +1,62 @@
+"""What routes ask for: the service, names, and records of what exists."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import Depends, Path, Request
+from lineloom.wire import ID_PATTERN
+from lineloom_core.mapping.site_view import SiteView
+
+from lineloom_service.errors import UNKNOWN_ROBOT, UNKNOWN_SITE, ProblemError
+from lineloom_service.service import Service
+from lineloom_service.store.records import RobotRecord, SiteRecord
+
+SiteName = Annotated[
+    str, Path(alias="site", pattern=ID_PATTERN, description="One floor of one building.")
+]
+RobotName = Annotated[str, Path(alias="robot", pattern=ID_PATTERN, description="A robot's name.")]
+
+
+def get_service(request: Request) -> Service:
+    """Return the service behind the app."""
+    service: Service = request.app.state.service
+    return service
+
+
+ServiceDep = Annotated[Service, Depends(get_service)]
+
+
+async def known_site(name: SiteName, service: ServiceDep) -> SiteRecord:
+    """Return a site that exists, or 404."""
+    record = await service.store.site(name)
+    if record is None:
+        raise ProblemError(UNKNOWN_SITE, f"no site {name!r}; it is created by its first scan")
+    return record
+
+
+KnownSite = Annotated[SiteRecord, Depends(known_site)]
+
+
+def current_view(site: KnownSite, service: ServiceDep) -> SiteView:
+    """Return the latest published view of a site; never waits for the mapper."""
+    return service.conductor.published(site.id).view
+
+
+CurrentView = Annotated[SiteView, Depends(current_view)]
+
+
+def find_robot(site: SiteRecord, name: str) -> RobotRecord:
+    """Return a robot of the site, or raise the 404."""
+    record = site.robots.get(name)
+    if record is None:
+        raise ProblemError(UNKNOWN_ROBOT, f"no robot {name!r} in site {site.name!r}")
+    return record
+
+
+def known_robot(site: KnownSite, name: RobotName) -> RobotRecord:
+    """Return a robot that exists, or 404."""
+    return find_robot(site, name)
+
+
+KnownRobot = Annotated[RobotRecord, Depends(known_robot)]

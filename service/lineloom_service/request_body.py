@@ -1,0 +1,121 @@
+"""Reads a request's body: within limits, decompressed, decoded to plain Python values."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+from typing import Any
+
+import msgpack
+from fastapi import Request
+from lineloom.wire import JSON, MSGPACK
+from pydantic_core import from_json
+
+from lineloom_service.errors import (
+    MALFORMED_BODY,
+    TOO_LARGE,
+    UNSUPPORTED_ENCODING,
+    UNSUPPORTED_TYPE,
+    ProblemError,
+)
+
+_GZIP = 31  # zlib's window bits for "a gzip header and trailer, nothing else"
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A decoded body. is_json: it came as JSON, where NaN and Infinity are no values."""
+
+    value: Any
+    is_json: bool
+
+
+async def read_body(request: Request, limit: int) -> Body:
+    """Return the body of a request of at most `limit` bytes, compressed as well as plain.
+
+    Raises ProblemError: 415 before anything is read, 413 as soon as it is known, 400.
+    """
+    is_json = _is_json(request)
+    is_gzip = _is_gzip(request)
+    data = await _read(request, limit)
+    if is_gzip:
+        data = _gunzip(data, limit)
+    return Body(_decode_json(data) if is_json else _decode_msgpack(data), is_json)
+
+
+def _is_json(request: Request) -> bool:
+    content_type = request.headers.get("content-type", "").split(";")[0].strip().lower()
+    if content_type not in (JSON, MSGPACK):
+        raise ProblemError(
+            UNSUPPORTED_TYPE,
+            f"Content-Type is {content_type or 'missing'}; send {JSON} or {MSGPACK}",
+            headers={"Accept": f"{JSON}, {MSGPACK}"},
+        )
+    return content_type == JSON
+
+
+def _is_gzip(request: Request) -> bool:
+    encoding = request.headers.get("content-encoding", "identity").strip().lower()
+    if encoding not in ("identity", "gzip", ""):
+        raise ProblemError(
+            UNSUPPORTED_ENCODING,
+            f"Content-Encoding is {encoding}; send gzip or none",
+            headers={"Accept-Encoding": "gzip"},
+        )
+    return encoding == "gzip"
+
+
+async def _read(request: Request, limit: int) -> bytes:
+    declared = request.headers.get("content-length", "")
+    if declared.isdigit() and int(declared) > limit:
+        raise _too_large(limit)
+    parts: list[bytes] = []
+    size = 0
+    async for part in request.stream():
+        size += len(part)
+        if size > limit:
+            raise _too_large(limit)
+        parts.append(part)
+    return b"".join(parts)
+
+
+def _gunzip(data: bytes, limit: int) -> bytes:
+    plain = bytearray()
+    while data:
+        stream = zlib.decompressobj(_GZIP)
+        try:
+            # One byte more than allowed tells a full body from one that is too large.
+            plain += stream.decompress(data, limit + 1 - len(plain))
+        except zlib.error as error:
+            raise ProblemError(MALFORMED_BODY, f"the body is not gzip: {error}") from error
+        if len(plain) > limit:
+            raise _too_large(limit)
+        if not stream.eof:
+            raise ProblemError(MALFORMED_BODY, "the gzip stream ends too early")
+        data = stream.unused_data
+    return bytes(plain)
+
+
+def _decode_json(data: bytes) -> Any:
+    try:
+        # NaN and Infinity pass here, to be refused later by the field that has them.
+        return from_json(data, allow_inf_nan=True)
+    except ValueError as error:
+        raise ProblemError(MALFORMED_BODY, f"the body is not JSON: {error}") from error
+
+
+def _decode_msgpack(data: bytes) -> Any:
+    try:
+        return msgpack.unpackb(data)
+    except ValueError as error:
+        reason = str(error) or type(error).__name__
+        raise ProblemError(MALFORMED_BODY, f"the body is not msgpack: {reason}") from error
+
+
+def _too_large(limit: int) -> ProblemError:
+    # The rest of the body is not read: the connection cannot be used again.
+    return ProblemError(
+        TOO_LARGE,
+        f"a body may have {limit} bytes, also after decompression; send fewer scans at a time",
+        headers={"Connection": "close"},
+    )

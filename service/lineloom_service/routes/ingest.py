@@ -1,0 +1,44 @@
+"""Taking scans."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request, Response
+from lineloom import wire
+
+from lineloom_service.answers import answer
+from lineloom_service.dependencies import RobotName, ServiceDep, SiteName
+from lineloom_service.intake import take_in
+from lineloom_service.openapi import body_of
+from lineloom_service.request_body import read_body
+
+router = APIRouter(tags=["ingest"])
+
+
+@router.post(
+    "/v1/sites/{site}/robots/{robot}/scans",
+    status_code=202,
+    response_model=wire.IngestAnswer,
+    openapi_extra=body_of("Scan", "ScanBatch"),
+)
+async def post_scans(
+    site: SiteName, robot: RobotName, request: Request, service: ServiceDep
+) -> Response:
+    """Take one scan, or `{"scans": [...]}`. 202 means: on disk. Sending again is harmless."""
+    settings = service.settings
+    body = await read_body(request, settings.max_body_bytes)
+    intake = await take_in(body, settings.max_batch)
+    known = await service.store.site(site)
+    processed = 0 if known is None else service.conductor.published(known.id).position
+    appended = await service.store.append_scans(
+        site, robot, intake.scans, processed=processed, limit=settings.backlog_limit
+    )
+    published = service.conductor.published(appended.site_id)
+    return answer(
+        wire.IngestAnswer(
+            accepted=appended.accepted,
+            duplicates=appended.duplicates,
+            rejected=intake.rejected,
+            pending=max(0, appended.position - published.position) + appended.held,
+        ),
+        status=202,
+    )

@@ -1,0 +1,45 @@
+"""Alive, and ready."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Response
+from lineloom import wire
+
+from lineloom_service import __version__
+from lineloom_service.answers import answer
+from lineloom_service.dependencies import ServiceDep
+from lineloom_service.errors import NOT_READY, PROBLEM_JSON
+
+router = APIRouter(tags=["status"])
+
+
+class _NotReady(wire.Problem, wire.Readiness):
+    """A problem that readers of Readiness understand as well."""
+
+
+@router.get("/healthz", response_model=wire.Health)
+async def healthz() -> Response:
+    """The process answers."""
+    return answer(wire.Health(status="ok", version=__version__))
+
+
+@router.get("/readyz", response_model=wire.Readiness)
+async def readyz(service: ServiceDep) -> Response:
+    """Workers are warm and all sites restored; 503 says what is missing."""
+    reasons = service.not_ready()
+    if not reasons:
+        return answer(wire.Readiness(ready=True, reasons=[]))
+    problem = _NotReady(
+        type=f"/problems/{NOT_READY.slug}",
+        title=NOT_READY.title,
+        status=NOT_READY.status,
+        detail="; ".join(reasons),
+        ready=False,
+        reasons=reasons,
+    )
+    return Response(
+        problem.model_dump_json(),
+        status_code=problem.status,
+        media_type=PROBLEM_JSON,
+        headers={"Retry-After": "1"},
+    )

@@ -1,0 +1,60 @@
+"""The service without its HTTP face: store, engine and matcher, started and stopped together."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+
+from lineloom_service.engine.conductor import Conductor
+from lineloom_service.engine.local_engine import LocalEngine
+from lineloom_service.engine.protocol import Engine
+from lineloom_service.matching import PairMatcher
+from lineloom_service.settings import Settings
+from lineloom_service.store.protocol import Store
+from lineloom_service.store.sqlite_store import SqliteStore
+
+_LOG = logging.getLogger(__name__)
+
+
+class Service:
+    """What the routes work with. Store and engine may be given; the embedded ones are default."""
+
+    def __init__(
+        self, settings: Settings, *, store: Store | None = None, engine: Engine | None = None
+    ) -> None:
+        self.settings = settings
+        self.store: Store = store or SqliteStore(
+            settings.database_path,
+            gap_window_s=settings.gap_window_s,
+            max_held=settings.max_held,
+        )
+        self.engine: Engine = engine or LocalEngine(
+            settings.workers, publish_every_s=settings.publish_every_s
+        )
+        self.conductor = Conductor(self.store, self.engine, settings)
+        self.matcher = PairMatcher()
+        self._warming: asyncio.Task[None] | None = None
+
+    async def start(self) -> None:
+        """Open the store and begin to map. Raises StoreError. Readiness comes later."""
+        await self.store.open()
+        await self.conductor.start()
+        self._warming = asyncio.create_task(self.matcher.warm_up())
+        self._warming.add_done_callback(_report_failure)
+
+    async def stop(self) -> None:
+        """Save and close. What was answered 202 is safe in any case."""
+        if self._warming is not None:
+            self._warming.cancel()
+        self.matcher.close()
+        await self.conductor.stop()
+        await self.store.close()
+
+    def not_ready(self) -> list[str]:
+        """Return why the service is not ready; empty when it is."""
+        return self.conductor.not_ready() + self.matcher.not_ready()
+
+
+def _report_failure(task: asyncio.Task[None]) -> None:
+    if not task.cancelled() and task.exception() is not None:
+        _LOG.critical("the matcher does not start", exc_info=task.exception())
