@@ -183,7 +183,16 @@ def test_a_strangers_answers_are_told_apart(run: Run, fake: FakeService) -> None
         run("sites", (), {})
     fake.failures = [lambda request: httpx.Response(301, headers={"Location": "https://x/"})]
     with pytest.raises(UnexpectedAnswerError, match="moved to https://x/"):
-        run("sites", (), {})
+        run("post_scan", ("s", "r", scan(0)), {})
+
+
+def test_the_map_of_a_merged_component_is_its_survivors(run: Run, fake: FakeService) -> None:
+    there = {"Location": "/v1/sites/s/map?format=svg&component=c1"}
+    fake.failures = [lambda request: httpx.Response(307, headers=there)]
+    fake.routes["GET", "/v1/sites/s/map"] = lambda request: httpx.Response(
+        200, text=request.url.params["component"]
+    )
+    assert run("map_file", ("s", "svg"), {}) == b"c1"
 
 
 def test_the_wait_ends_when_the_map_is_done(run: Run, fake: FakeService) -> None:

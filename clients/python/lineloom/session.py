@@ -81,6 +81,8 @@ class Session:
             "params": dict(call.params) or None,
             "headers": dict(call.headers),
             "content": call.content,
+            # The map of a component that was merged answers with its survivor's address.
+            "follow_redirects": call.method == "GET",
         }
 
     def after_failure(self, call: Call[Any], attempt: int, error: httpx.TransportError) -> float:
