@@ -83,7 +83,7 @@ class Scan:
             if not math.isfinite(value):
                 raise InvalidScanError(name, "must be a finite number")
         _check_limits(range_min, range_max, time_increment, scan_time, seq)
-        values = np.array(ranges, dtype=np.float64)  # a copy: the caller keeps its own
+        values = _as_numbers(ranges)
         _check_beams(values, angle_increment, angle_min, angle_max)
         if odometry is not None and not np.all(np.isfinite(odometry.to_array())):
             raise InvalidScanError("odometry", "x, y and theta must be finite numbers")
@@ -135,6 +135,14 @@ class Scan:
         hit = np.isfinite(self.ranges)
         r, a = self.ranges[hit], self.angles[hit]
         return np.column_stack([r * np.cos(a), r * np.sin(a)])
+
+
+def _as_numbers(ranges: ArrayLike) -> NDArray[np.float64]:
+    """Return a copy as float64: the caller keeps its own."""
+    try:
+        return np.array(ranges, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InvalidScanError("ranges", "must be a list of numbers") from None
 
 
 def _check_limits(
