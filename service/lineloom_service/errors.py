@@ -128,7 +128,8 @@ def install(app: FastAPI) -> None:
 
     @app.exception_handler(RequestValidationError)
     async def _parameter(_: Request, error: RequestValidationError) -> Response:
-        faults = [_describe_parameter(fault["loc"], fault["msg"]) for fault in error.errors()]
+        # Once each: several dependencies may ask for the same parameter.
+        faults = {_describe_parameter(fault["loc"], fault["msg"]): 0 for fault in error.errors()}
         return problem_response(INVALID_PARAMETER, "; ".join(faults))
 
     @app.exception_handler(HTTPException)
