@@ -81,6 +81,7 @@ class Tracker:
         self._map: LocalMap | None = None
         self._pose = Pose.identity()
         self._twist = np.zeros(3)  # m/s, m/s, rad/s in the laser's axes
+        self._twist_span = 0.0  # s over which it was measured
         self._stamp = 0.0
         self._odometry: Pose | None = None
         self._misses = 0
@@ -116,6 +117,8 @@ class Tracker:
     def _predict(self, stamp: float, odometry: Pose | None) -> list[Pose]:
         """Where the robot may be: same velocity, and what its wheels say."""
         dt = min(max(stamp - self._stamp, 0.0), self._config.longest_gap)
+        # Where scans arrive in bursts, stamps lie: two steps at most, whatever the clock says.
+        dt = min(dt, 2.0 * self._twist_span)
         predictions = [self._pose @ Pose.from_array(self._twist * dt)]
         if odometry is not None and self._odometry is not None:
             predictions.append(self._pose @ self._odometry.between(odometry))
@@ -146,6 +149,7 @@ class Tracker:
         dt = stamp - self._stamp
         if 0.01 < dt < 1.0:  # steps of zero or less occur in real logs
             self._twist = self._pose.between(pose).to_array() / dt
+            self._twist_span = dt
         elif dt >= 1.0:
             self._twist = np.zeros(3)
         self._pose, self._stamp, self._odometry = pose, stamp, odometry
