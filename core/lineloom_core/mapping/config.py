@@ -43,15 +43,21 @@ class ClosureConfig:
 class JoinConfig:
     """Believing a set of candidate constraints.
 
-    least_set: mutually consistent constraints that join two components. least_evidence: metres of
-    wall in the set. lead: how many times the evidence of the best rival set. most_conflict: share
-    of points in free space over all places that would overlap. drift: growth of a track's error
-    (m per m, rad per m) on top of (m, rad).
+    least_set: mutually consistent constraints that join two components. least_places: places in
+    each, so that it is known what else looks alike. least_evidence: metres of wall in the set.
+    lead: how many times the evidence of the best rival set. least_distinctive: constraints of the
+    set whose evidence must be `distinctive` times that of any known mistake about their places.
+    most_conflict: share of points in free space over all places that would overlap. drift: growth
+    of a track's error (m per m, rad per m) on top of (m, rad). loop_gate: sigmas of drift within
+    which a loop is believed.
     """
 
     least_set: int = 3
+    least_places: int = 3
     least_evidence: float = 60.0
     lead: float = 2.0
+    least_distinctive: int = 2
+    distinctive: float = 1.3
     most_conflict: float = 0.08
     drift_floor: tuple[float, float] = (0.06, 0.01)
     drift_rate: tuple[float, float] = (0.01, 0.0008)

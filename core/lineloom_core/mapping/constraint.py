@@ -15,6 +15,9 @@ from lineloom_core.mapping.site_view import ConstraintKind, ConstraintState
 INDEPENDENT_SHARE = 0.05
 """Neighbouring points of a scan err together: this share of them counts as independent."""
 
+CONSTRAINT_FLOOR = np.diag([0.05**2, 0.05**2, 0.01**2])
+"""How far two right constraints may disagree besides drift."""
+
 _FLOOR = np.diag([0.006**2, 0.006**2, 0.002**2])  # m^2, m^2, rad^2: the lidar's own limits
 
 

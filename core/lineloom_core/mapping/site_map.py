@@ -29,6 +29,8 @@ class SiteMap:
         self.graph = PoseGraph()
         self.merged_into: dict[str, str] = {}
         self.looped_tracks: dict[int, None] = {}
+        self.alias: dict[tuple[int, int], float] = {}
+        """By pair of places: how much of one could be mistaken for the other (`distinctive`)."""
         self._numbers = {"keyframe": 0, "track": 0, "place": 0, "constraint": 0}
 
     def number(self, what: str) -> int:
@@ -111,6 +113,9 @@ class SiteMap:
             del self.keyframes[keyframe]
         self.tracks = {t.id: t for t in self.tracks.values() if t.robot != robot}
         self.places = {p.id: p for p in self.places.values() if p.track in self.tracks}
+        self.alias = {
+            (a, b): e for (a, b), e in self.alias.items() if a in self.places and b in self.places
+        }
         self.constraints = {
             c.id: c
             for c in self.constraints.values()
@@ -121,6 +126,11 @@ class SiteMap:
         self.merged_into = {
             a: b for a, b in self.merged_into.items() if a not in alive and b in alive
         }
+
+    def places_in_component(self, keyframe: int) -> int:
+        """Number of places in the component of a keyframe."""
+        root = self.component_root(keyframe)
+        return sum(1 for p in self.places.values() if self.component_root(p.anchor) == root)
 
     def nearby(self, keyframe: int, radius: float) -> list[tuple[int, float]]:
         """Keyframes of the same component within `radius` m, nearest first, with distances."""

@@ -21,11 +21,11 @@ import numpy as np
 
 from lineloom_core.features import extract_features
 from lineloom_core.geometry import Pose
+from lineloom_core.mapping.candidates import consider
 from lineloom_core.mapping.changes import Changes, ComponentMerged
 from lineloom_core.mapping.closing import close_nearby
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.constraint import Constraint, step_information
-from lineloom_core.mapping.joining import consider
 from lineloom_core.mapping.keyframe import Keyframe
 from lineloom_core.mapping.robot_record import PlacedScan, RobotRecord, Track
 from lineloom_core.mapping.site_map import SiteMap

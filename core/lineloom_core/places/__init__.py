@@ -1,6 +1,11 @@
 """Places: submaps that are recognised without any pose."""
 
 from lineloom_core.places.place import Glimpse, Place
-from lineloom_core.places.recognition import Recognition, RecognitionConfig, recognise
+from lineloom_core.places.recognition import (
+    Recognition,
+    RecognitionConfig,
+    alias_evidence,
+    recognise,
+)
 
-__all__ = ["Glimpse", "Place", "Recognition", "RecognitionConfig", "recognise"]
+__all__ = ["Glimpse", "Place", "Recognition", "RecognitionConfig", "alias_evidence", "recognise"]

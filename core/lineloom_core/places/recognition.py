@@ -7,13 +7,12 @@ registration of the best hypotheses; 8. margin to the best rival; 9. the verdict
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lineloom_core.geometry import Pose
+from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.graph.observability import observe
 from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
 from lineloom_core.matching.local_map import Registration
@@ -71,17 +70,7 @@ def recognise(
 ) -> Recognition:
     """Match two places without any pose and judge the best hypothesis."""
     config = config or RecognitionConfig()
-    if len(reference.lines) < 2 or len(current.lines) < 2:
-        return _refused("too few lines")
-    table = _kernels.match_places(
-        reference.lines, reference.ends, reference.edges, reference.surface.points,
-        reference.ranges, reference.angle_mins, reference.angle_increments, reference.sweep_poses,
-        current.lines, current.ends, current.edges, current.surface.points,
-        current.ranges, current.angle_mins, current.angle_increments, current.sweep_poses,
-        config.rotations, config.cells, 0.25, config.pair_limit, config.cell, config.half, 0.3,
-        config.least_explained, config.coarse_keep, config.fine_keep, 4,
-        TOLERANCE, TOLERANCE_SLOPE,
-    )  # fmt: skip
+    table = _hypotheses(reference, current, config)
     if len(table) == 0:
         return _refused("too little in common")
     if _kernels.place_evidence(table[0, 5], table[0, 6], table[0, 9]) < config.least_overlap:
@@ -93,7 +82,8 @@ def recognise(
     checks["overlap"] = float(table[0, 9])
     evidence = _kernels.place_evidence(checks["matched"], checks["conflict"], table[0, 9])
     checks["evidence"] = evidence
-    checks["margin"] = _margin(table, registered.pose, evidence, config)
+    rival = _best_elsewhere(table, registered.pose, config)
+    checks["margin"] = 1.0 - rival / evidence if evidence > 0.0 else 0.0
     reason = _objection(checks, config)
     return Recognition(
         plausible=reason == "",
@@ -103,6 +93,41 @@ def recognise(
         evidence=evidence,
         checks=checks,
     )
+
+
+def alias_evidence(
+    reference: Place,
+    current: Place,
+    T_reference_current: Pose,
+    uncertainty: float,
+    config: RecognitionConfig | None = None,
+) -> float:
+    """How much of `current` could be mistaken for `reference`, in metres of wall.
+
+    The evidence of the best hypothesis that is not the known relative pose, which itself may be
+    wrong by `uncertainty` [m]. Asked of places of one
+    component, or of a place and itself, it tells how distinctive a place is: a room that looks the
+    same turned round, or a corridor like the next one, proves little when it is seen again.
+    """
+    config = config or RecognitionConfig()
+    table = _hypotheses(reference, current, config)
+    return _best_elsewhere(table, T_reference_current, config, slack=uncertainty)
+
+
+def _hypotheses(reference: Place, current: Place, config: RecognitionConfig) -> NDArray[np.float64]:
+    """Refined hypotheses, best first (see `_kernels.match_places`)."""
+    if len(reference.lines) < 2 or len(current.lines) < 2:
+        return np.empty((0, 10))
+    table: NDArray[np.float64] = _kernels.match_places(
+        reference.lines, reference.ends, reference.edges, reference.surface.points,
+        reference.ranges, reference.angle_mins, reference.angle_increments, reference.sweep_poses,
+        current.lines, current.ends, current.edges, current.surface.points,
+        current.ranges, current.angle_mins, current.angle_increments, current.sweep_poses,
+        config.rotations, config.cells, 0.25, config.pair_limit, config.cell, config.half, 0.3,
+        config.least_explained, config.coarse_keep, config.fine_keep, 4,
+        TOLERANCE, TOLERANCE_SLOPE,
+    )  # fmt: skip
+    return table
 
 
 def check_alignment(reference: Place, current: Place, registered: Registration) -> dict[str, float]:
@@ -134,18 +159,18 @@ def count_points(
     return float(counts[0]), float(counts[1])
 
 
-def _margin(
-    table: NDArray[np.float64], pose: Pose, evidence: float, config: RecognitionConfig
+def _best_elsewhere(
+    table: NDArray[np.float64], pose: Pose, config: RecognitionConfig, slack: float = 0.0
 ) -> float:
-    """Share by which the best hypothesis beats the best one that is somewhere else."""
-    rival = 0.0
+    """Evidence of the best hypothesis that is another relative pose than `pose`."""
+    best = 0.0
     for row in table:
         other = Pose.from_array(row[:3])
-        apart = pose.distance(other) > config.rival_distance
-        turned = abs(math.remainder(other.theta - pose.theta, math.tau)) > config.rival_angle
+        apart = pose.distance(other) > config.rival_distance + slack
+        turned = abs(angle_difference(other.theta, pose.theta)) > config.rival_angle
         if apart or turned:
-            rival = max(rival, _kernels.place_evidence(row[5], row[6], row[9]))
-    return 1.0 - rival / evidence if evidence > 0.0 else 0.0
+            best = max(best, float(_kernels.place_evidence(row[5], row[6], row[9])))
+    return best
 
 
 def _objection(checks: dict[str, float], config: RecognitionConfig) -> str:
