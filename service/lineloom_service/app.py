@@ -7,7 +7,7 @@ from contextlib import asynccontextmanager
 
 from fastapi import FastAPI
 
-from lineloom_service import errors, openapi
+from lineloom_service import __version__, errors, openapi
 from lineloom_service.routes import ROUTERS
 from lineloom_service.service import Service
 from lineloom_service.settings import Settings
@@ -28,6 +28,8 @@ def create_app(settings: Settings | None = None, *, service: Service | None = No
                 await own.stop()
 
     app = FastAPI(
+        title="Lineloom",
+        version=__version__,
         lifespan=lifespan,
         responses=openapi.PROBLEM_ANSWER,
         # A redirect would lose the body of a POST in many clients: one address, one spelling.

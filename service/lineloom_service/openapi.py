@@ -9,8 +9,6 @@ from fastapi.openapi.utils import get_openapi
 from lineloom import wire
 from pydantic.json_schema import models_json_schema
 
-from lineloom_service import __version__
-
 _SCHEMAS = "#/components/schemas/"
 _BODIES = (wire.Scan, wire.ScanBatch, wire.RobotSettings, wire.MatchRequest, wire.Problem)
 _DESCRIPTION = """\
@@ -51,8 +49,8 @@ def install(app: FastAPI) -> None:
     def describe() -> dict[str, Any]:
         if app.openapi_schema is None:
             document = get_openapi(
-                title="Lineloom",
-                version=__version__,
+                title=app.title,
+                version=app.version,
                 description=_DESCRIPTION,
                 routes=app.routes,
             )

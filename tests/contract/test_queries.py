@@ -1,0 +1,408 @@
+"""Every query of the contract, on a site whose map is known (the fake mapper's)."""
+
+from __future__ import annotations
+
+import asyncio
+import csv
+import json
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import httpx
+import networkx as nx
+import numpy as np
+import pytest
+import pytest_asyncio
+from lineloom import wire
+
+pytestmark = pytest.mark.asyncio(loop_scope="module")
+
+Make = Callable[..., dict[str, Any]]
+Idle = Callable[[str], Awaitable[dict[str, Any]]]
+
+SITE = "/v1/sites/office"
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module", autouse=True)
+async def _office(client: httpx.AsyncClient, make_scan: Make, idle: Idle) -> None:
+    """Robots a and b in component c1 with 3 and 5 scans, `alone` in its own with 1."""
+    for robot, scans in (("a", 3), ("b", 5), ("alone", 1)):
+        body = {"scans": [make_scan(seq) for seq in range(scans)]}
+        await client.post(f"{SITE}/robots/{robot}/scans", json=body)
+    await idle("office")
+
+
+async def _get(client: httpx.AsyncClient, path: str, **params: str) -> httpx.Response:
+    response = await client.get(f"{SITE}{path}", params=params)
+    assert response.status_code == 200, response.text
+    return response
+
+
+async def _refused(
+    client: httpx.AsyncClient, path: str, status: int, slug: str, **params: str
+) -> dict[str, Any]:
+    response = await client.get(path, params=params)
+    assert response.status_code == status, response.text
+    assert response.headers["content-type"] == "application/problem+json"
+    problem: dict[str, Any] = response.json()
+    assert problem["type"] == f"/problems/{slug}"
+    return problem
+
+
+async def test_sites(client: httpx.AsyncClient) -> None:
+    (site,) = (await client.get("/v1/sites")).json()["sites"]
+    assert site == (await _get(client, "")).json()
+
+
+async def test_site(client: httpx.AsyncClient) -> None:
+    site = (await _get(client, "")).json()
+    assert site["site"] == "office"
+    assert site["version"] == 9
+    assert site["idle"] is True
+    assert site["scans"] == {"accepted": 9, "processed": 9, "pending": 0, "skipped": 0}
+    assert site["robots"] == ["a", "alone", "b"]
+    assert site["components"][1] == {"id": "c1", "robots": ["a", "b"], "keyframes": 1}
+    assert site["constraints"] == {"rendezvous": {"accepted": 1}, "loop": {"rejected": 1}}
+
+
+async def test_robots(client: httpx.AsyncClient) -> None:
+    answer = (await _get(client, "/robots")).json()
+    assert [robot["robot"] for robot in answer["robots"]] == ["a", "alone", "b"]
+    robot = (await _get(client, "/robots/b")).json()
+    assert robot == answer["robots"][2]
+    assert robot["component"] == "c1"
+    assert robot["state"] == "tracking"
+    pose = robot["pose"]
+    assert (pose["x"], pose["y"], pose["theta"]) == (5.0, 0.0, 0.0)
+    assert np.array(pose["covariance"]).shape == (3, 3)
+    assert robot["scans"] == {"accepted": 5, "processed": 5, "pending": 0, "skipped": 0}
+    assert (robot["latest_seq"], robot["latest_stamp"]) == (4, 104.0)
+    assert robot["mount"] is None
+
+
+async def test_trajectory_as_json(client: httpx.AsyncClient) -> None:
+    answer = (await _get(client, "/robots/a/trajectory")).json()
+    assert (answer["robot"], answer["version"]) == ("a", 9)
+    assert answer["poses"][2] == {
+        "session": "0",
+        "seq": 2,
+        "stamp": 102.0,
+        "component": "c1",
+        "x": 3.0,
+        "y": 0.0,
+        "theta": 0.0,
+    }
+    assert len(answer["poses"]) == 3
+
+
+async def test_trajectory_as_tum_and_csv(client: httpx.AsyncClient) -> None:
+    tum = await _get(client, "/robots/a/trajectory", format="tum")
+    assert tum.headers["content-type"].startswith("text/plain")
+    rows = [row.split() for row in tum.text.splitlines() if not row.startswith("#")]
+    assert [float(v) for v in rows[0]] == [100.0, 1.0, 0, 0, 0, 0, 0, 1]
+    table = await _get(client, "/robots/a/trajectory", format="csv")
+    assert table.headers["content-type"].startswith("text/csv")
+    records = list(csv.DictReader(table.text.splitlines()))
+    assert [record["seq"] for record in records] == ["0", "1", "2"]
+
+
+async def test_transform(client: httpx.AsyncClient) -> None:
+    answer = (await _get(client, "/transforms/a/b")).json()
+    assert answer["T_a_b"] == {"x": 2.0, "y": 0.0, "theta": 0.0}
+    assert answer["component"] == "c1"
+    assert answer["constraints"] == ["k0-2"]
+    # Both robots' own figures add up, and b's bearing of a's heading error: 2 m away.
+    expected = np.diag([0.02, 0.02 + 2.0**2 * 0.001, 0.002])
+    expected[1, 2] = expected[2, 1] = 2.0 * 0.001
+    np.testing.assert_allclose(answer["covariance"], expected, atol=1e-12)
+    back = (await _get(client, "/transforms/b/a")).json()
+    assert back["T_a_b"]["x"] == -2.0
+    same = (await _get(client, "/transforms/a/a")).json()
+    assert same["T_a_b"] == {"x": 0.0, "y": 0.0, "theta": 0.0}
+
+
+async def test_transform_of_robots_that_never_met(client: httpx.AsyncClient) -> None:
+    problem = await _refused(client, f"{SITE}/transforms/a/alone", 409, "not-connected")
+    assert "c1" in problem["detail"]
+    assert "c-alone" in problem["detail"]
+    await _refused(client, f"{SITE}/transforms/a/nobody", 404, "unknown-robot")
+
+
+async def test_map_as_json(client: httpx.AsyncClient) -> None:
+    answer = (await _get(client, "/map")).json()
+    assert (answer["site"], answer["version"]) == ("office", 9)
+    assert answer["components"] == [
+        {"id": "c-alone", "robots": ["alone"]},
+        {"id": "c1", "robots": ["a", "b"]},
+    ]
+    assert len(answer["lines"]) == 6
+    assert set(answer["lines"][0]) == {
+        *("id", "component", "x1", "y1", "x2", "y2", "sigma", "support"),
+        *("robots", "first_seen", "last_seen"),
+    }
+
+
+async def test_map_filters(client: httpx.AsyncClient) -> None:
+    answer = (await _get(client, "/map", component="c1")).json()
+    assert {line["component"] for line in answer["lines"]} == {"c1"}
+    assert [component["id"] for component in answer["components"]] == ["c1"]
+    answer = (await _get(client, "/map", component="c1", bbox="1.5,-1,1.7,1")).json()
+    assert [line["x1"] for line in answer["lines"]] == [1]
+    answer = (await _get(client, "/map", format="geojson", bbox="50,50,60,60")).json()
+    assert answer["features"] == []
+
+
+async def test_map_formats(client: httpx.AsyncClient) -> None:
+    svg = await _get(client, "/map", format="svg")
+    assert svg.headers["content-type"].startswith("image/svg+xml")
+    assert "<svg" in svg.text
+    png = await _get(client, "/map", format="png", component="c1")
+    assert png.headers["content-type"] == "image/png"
+    assert png.content.startswith(b"\x89PNG\r\n")
+    geojson = await _get(client, "/map", format="geojson")
+    assert geojson.headers["content-type"] == "application/geo+json"
+    assert geojson.json()["type"] == "FeatureCollection"
+    problem = await _refused(client, f"{SITE}/map", 422, "unknown-format", format="bmp")
+    assert problem["detail"] == "no format 'bmp'; available are json, geojson, svg, png"
+
+
+@pytest.mark.parametrize("bbox", ["", "1,2,3", "1,2,3,4,5", "a,b,c,d", "0,0,0,1", "nan,0,1,1"])
+async def test_a_bbox_that_is_none(client: httpx.AsyncClient, bbox: str) -> None:
+    problem = await _refused(client, f"{SITE}/map", 422, "invalid-parameter", bbox=bbox)
+    assert "bbox" in problem["detail"]
+
+
+async def test_a_component_that_was_merged_points_to_its_survivor(
+    client: httpx.AsyncClient,
+) -> None:
+    response = await client.get(f"{SITE}/map", params={"component": "c9", "format": "json"})
+    assert response.status_code == 307
+    assert response.headers["location"] == f"{SITE}/map?component=c1&format=json"
+    assert response.json() == {"component": "c9", "merged_into": "c1"}
+    await _refused(client, f"{SITE}/map", 404, "unknown-component", component="c77")
+
+
+async def test_a_map_that_did_not_change_is_304(
+    client: httpx.AsyncClient, make_scan: Make, idle: Idle
+) -> None:
+    await client.post("/v1/sites/cached/robots/r/scans", json=make_scan(0))
+    await idle("cached")
+    url = "/v1/sites/cached/map"
+    etag = (await client.get(url)).headers["etag"]
+    for current in (etag, f'"other", W/{etag}', "*"):
+        response = await client.get(url, headers={"If-None-Match": current})
+        assert (response.status_code, response.content) == (304, b"")
+        assert response.headers["etag"] == etag
+    await client.post("/v1/sites/cached/robots/r/scans", json=make_scan(1))
+    await idle("cached")
+    response = await client.get(url, headers={"If-None-Match": etag})
+    assert response.status_code == 200
+    assert response.headers["etag"] != etag
+
+
+async def test_graph(client: httpx.AsyncClient) -> None:
+    answer = (await _get(client, "/graph")).json()
+    graph = nx.node_link_graph(answer, edges="edges")
+    assert (graph.number_of_nodes(), graph.number_of_edges()) == (3, 1)
+    assert graph.nodes[0]["robot"] == "a"
+    assert graph.graph == {"site": "office", "version": 9}
+    assert list(graph.edges(keys=True)) == [(0, 2, "k0-2")]
+    g2o = await _get(client, "/graph", format="g2o")
+    assert g2o.text.count("VERTEX_SE2") == 3
+    assert g2o.text.count("EDGE_SE2") == 1
+    await _refused(client, f"{SITE}/graph", 422, "unknown-format", format="dot")
+
+
+async def test_constraints(client: httpx.AsyncClient) -> None:
+    answer = (await _get(client, "/constraints")).json()
+    assert [c["id"] for c in answer["constraints"]] == ["k0-2", "k-rejected"]
+    assert answer["next_cursor"] is None
+    (first,) = (await _get(client, "/constraints", kind="rendezvous")).json()["constraints"]
+    assert first["checks"] == {"conflict": 0.02, "unknown": None}
+    assert (first["robot_a"], first["robot_b"]) == ("a", "b")
+    assert (first["reason"], first["residual"]) == ("they met", 0.5)
+    assert (await _get(client, "/constraints/k0-2")).json() == first
+    (other,) = (await _get(client, "/constraints", state="rejected")).json()["constraints"]
+    assert other["id"] == "k-rejected"
+    assert other["residual"] is None
+
+
+async def test_constraints_by_pages(client: httpx.AsyncClient) -> None:
+    page = (await _get(client, "/constraints", limit="1")).json()
+    assert [c["id"] for c in page["constraints"]] == ["k0-2"]
+    page = (await _get(client, "/constraints", limit="1", cursor=page["next_cursor"])).json()
+    assert [c["id"] for c in page["constraints"]] == ["k-rejected"]
+    assert page["next_cursor"] is None
+
+
+@pytest.mark.parametrize(
+    "params", [{"kind": "x"}, {"state": "x"}, {"limit": "0"}, {"limit": "x"}, {"cursor": "x"}]
+)
+async def test_constraint_filters_that_are_none(
+    client: httpx.AsyncClient, params: dict[str, str]
+) -> None:
+    await _refused(client, f"{SITE}/constraints", 422, "invalid-parameter", **params)
+
+
+@pytest.mark.parametrize(
+    ("path", "slug"),
+    [
+        ("/v1/sites/nowhere", "unknown-site"),
+        ("/v1/sites/nowhere/map", "unknown-site"),
+        ("/v1/sites/nowhere/robots", "unknown-site"),
+        (f"{SITE}/robots/nobody", "unknown-robot"),
+        (f"{SITE}/robots/nobody/trajectory", "unknown-robot"),
+        (f"{SITE}/constraints/none", "unknown-constraint"),
+        ("/v1/nothing", "not-found"),
+        ("/v1/sites/", "not-found"),
+        ("/favicon.ico", "not-found"),
+    ],
+)
+async def test_what_is_not_there(client: httpx.AsyncClient, path: str, slug: str) -> None:
+    await _refused(client, path, 404, slug)
+
+
+async def test_a_mount_is_set_shown_and_removed(
+    client: httpx.AsyncClient, make_scan: Make, idle: Idle
+) -> None:
+    url = "/v1/sites/mounts/robots/m"
+    mount = {"x": 0.2, "y": 0.0, "theta": 3.14, "inverted": True}
+    response = await client.put(url, json={"mount": mount})
+    assert response.status_code == 200
+    assert response.json()["mount"] == mount
+    assert response.json()["state"] == "starting"
+    assert (await idle("mounts"))["version"] == 1
+    await client.put(url, json={"mount": mount})
+    await client.post(f"{url}/scans", json=make_scan(0))
+    assert (await idle("mounts"))["version"] == 2
+    assert (await client.put(url, json={})).json()["mount"] is None
+    assert (await idle("mounts"))["version"] == 3
+
+
+@pytest.mark.parametrize(
+    ("body", "pointer"),
+    [
+        ({"mount": {"x": "1"}}, "/mount/x"),
+        ({"mount": {"inverted": 1}}, "/mount/inverted"),
+        ({"mount": {"z": 1.0}}, "/mount/z"),
+        ({"mout": {}}, "/mout"),
+        ([], ""),
+    ],
+)
+async def test_settings_that_are_none(client: httpx.AsyncClient, body: Any, pointer: str) -> None:
+    response = await client.put("/v1/sites/mounts/robots/n", json=body)
+    assert response.status_code == 422
+    assert pointer in [error["pointer"] for error in response.json()["errors"]]
+
+
+async def test_a_robot_is_forgotten(client: httpx.AsyncClient, make_scan: Make, idle: Idle) -> None:
+    for robot in ("r1", "r2"):
+        await client.post(f"/v1/sites/forget/robots/{robot}/scans", json=make_scan(0))
+    await idle("forget")
+    url = "/v1/sites/forget/robots/r1"
+    assert (await client.delete(url)).status_code == 204
+    await _refused(client, url, 404, "unknown-robot")
+    assert (await client.delete(url)).status_code == 404
+    site = await idle("forget")
+    assert site["robots"] == ["r2"]
+    assert site["components"] == [{"id": "c1", "robots": ["r2"], "keyframes": 1}]
+    again = await client.post(f"{url}/scans", json=make_scan(0))
+    assert again.json()["accepted"] == 1
+    await idle("forget")
+    assert (await client.get(url)).json()["scans"]["processed"] == 1
+
+
+async def test_a_site_is_deleted_and_starts_anew(
+    client: httpx.AsyncClient, make_scan: Make, idle: Idle
+) -> None:
+    url = "/v1/sites/gone"
+    await client.post(f"{url}/robots/r/scans", json={"scans": [make_scan(s) for s in range(3)]})
+    await idle("gone")
+    etag = (await client.get(f"{url}/map")).headers["etag"]
+    assert (await client.delete(url)).status_code == 204
+    await _refused(client, url, 404, "unknown-site")
+    await _refused(client, f"{url}/map", 404, "unknown-site")
+    assert (await client.delete(url)).status_code == 404
+    await client.post(f"{url}/robots/r/scans", json={"scans": [make_scan(s) for s in range(3)]})
+    assert (await idle("gone"))["version"] == 3
+    response = await client.get(f"{url}/map", headers={"If-None-Match": etag})
+    assert response.status_code == 200
+
+
+async def test_a_skipped_scan_is_told(
+    client: httpx.AsyncClient, make_scan: Make, idle: Idle
+) -> None:
+    body = {"scans": [make_scan(0), make_scan(1, stamp=666.0), make_scan(2)]}
+    await client.post("/v1/sites/skips/robots/r/scans", json=body)
+    site = await idle("skips")
+    assert site["scans"] == {"accepted": 3, "processed": 2, "pending": 0, "skipped": 1}
+    robot = (await client.get("/v1/sites/skips/robots/r")).json()
+    assert robot["scans"] == site["scans"]
+    assert robot["health"] == [
+        "scan 1 of session '0' was left out of the map: ValueError: this scan is cursed"
+    ]
+
+
+async def test_match(client: httpx.AsyncClient) -> None:
+    angles = np.linspace(-np.pi / 2, np.pi / 2, 181)
+
+    def seen_from(x: float, y: float) -> dict[str, Any]:
+        """A room of 8 m by 6 m with its centre in the origin, and a step in one wall."""
+        c, s = np.cos(angles), np.sin(angles)
+        with np.errstate(divide="ignore"):
+            across = np.where(c >= 0, (4.0 - x) / np.abs(c), (4.0 + x) / np.abs(c))
+            along = np.where(s >= 0, (3.0 - y) / np.abs(s), (2.0 + y) / np.abs(s))
+        return {
+            "angle_min": float(angles[0]),
+            "angle_increment": float(angles[1] - angles[0]),
+            "range_min": 0.05,
+            "range_max": 30.0,
+            "ranges": np.minimum(across, along).tolist(),
+        }
+
+    body = {"reference": seen_from(0.0, 0.0), "current": seen_from(0.5, 0.2)}
+    response = await client.post("/v1/match", json=body)
+    assert response.status_code == 200
+    answer = wire.MatchAnswer.model_validate_json(response.content)
+    assert answer.verdict in ("match", "ambiguous")
+    assert answer.T_reference_current is not None
+    assert answer.T_reference_current.x == pytest.approx(0.5, abs=0.05)
+    assert answer.T_reference_current.y == pytest.approx(0.2, abs=0.05)
+    assert answer.pairs
+    assert 0.0 <= answer.score <= 1.0
+
+
+async def test_match_of_nothing(client: httpx.AsyncClient, make_scan: Make) -> None:
+    empty = make_scan(0, ranges=["inf"] * 5)
+    response = await client.post("/v1/match", json={"reference": empty, "current": empty})
+    assert response.json()["verdict"] == "none"
+    assert response.json()["reason"]
+    for body, pointer in (
+        ({"reference": empty}, "/current"),
+        ({"reference": empty, "current": make_scan(0, ranges=[])}, "/current/ranges"),
+        ({"reference": make_scan(0, range_max=0.01), "current": empty}, "/reference/range_max"),
+        (
+            {"reference": make_scan(0, angle_min=float("nan")), "current": empty},
+            "/reference/angle_min",
+        ),
+        ([], ""),
+    ):
+        content = json.dumps(body).encode()
+        headers = {"Content-Type": "application/json"}
+        response = await client.post("/v1/match", content=content, headers=headers)
+        assert response.status_code == 422, body
+        assert pointer in [error["pointer"] for error in response.json()["errors"]]
+
+
+async def test_alive_and_ready(client: httpx.AsyncClient) -> None:
+    health = (await client.get("/healthz")).json()
+    assert health["status"] == "ok"
+    for _ in range(1000):
+        response = await client.get("/readyz")
+        if response.status_code == 200:
+            break
+        assert response.status_code == 503
+        assert response.headers["content-type"] == "application/problem+json"
+        assert response.json()["reasons"]
+        await asyncio.sleep(0.02)
+    assert response.json() == {"ready": True, "reasons": []}

@@ -1,0 +1,29 @@
+"""A real server process with the fake mapper: `python serve_fake.py DIRECTORY PORT`."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from pathlib import Path
+
+import uvicorn
+from lineloom_service.app import create_app
+from lineloom_service.engine.local_engine import LocalEngine
+from lineloom_service.service import Service
+from lineloom_service.settings import Settings
+
+
+async def _serve(directory: Path, port: int) -> None:
+    settings = Settings(data_dir=directory, gap_window_s=0.2, snapshot_every=100, port=port)
+    engine = LocalEngine(1, publish_every_s=0.1, mapper="fake_mapper:FakeMapper", warm_up=None)
+    service = Service(settings, engine=engine)
+    await service.start()
+    try:
+        config = uvicorn.Config(create_app(service=service), port=port, log_level="warning")
+        await uvicorn.Server(config).serve()
+    finally:
+        await service.stop()
+
+
+if __name__ == "__main__":
+    asyncio.run(_serve(Path(sys.argv[1]), int(sys.argv[2])))

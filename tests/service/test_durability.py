@@ -1,0 +1,157 @@
+"""202 means on disk: a server killed at a bad moment has lost nothing that it acknowledged."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from lineloom_service.server import run
+from lineloom_service.settings import Settings
+
+SERVER = Path(__file__).parent / "serve_fake.py"
+ROBOTS = 4
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+@contextmanager
+def _server(directory: Path, port: int) -> Iterator[subprocess.Popen[bytes]]:
+    command = [sys.executable, str(SERVER), str(directory), str(port)]
+    environment = {**os.environ, "PYTHONPATH": str(SERVER.parent)}
+    with subprocess.Popen(command, env=environment) as process:
+        try:
+            _wait_up(port, process)
+            yield process
+        finally:
+            process.kill()
+
+
+def _wait_up(port: int, process: subprocess.Popen[bytes]) -> None:
+    for _ in range(600):
+        assert process.poll() is None, "the server ended"
+        try:
+            if httpx.get(f"http://127.0.0.1:{port}/healthz").status_code == 200:
+                return
+        except httpx.TransportError:
+            pass
+        time.sleep(0.05)
+    raise AssertionError("never up")
+
+
+def _scan(seq: int) -> dict[str, Any]:
+    return {
+        "seq": seq,
+        "stamp": float(seq % 500),
+        "angle_min": -1.0,
+        "angle_increment": 0.1,
+        "range_min": 0.1,
+        "range_max": 30.0,
+        "ranges": [1.0 + 0.01 * (seq % 97)] * 20,
+    }
+
+
+async def _send_until_killed(port: int, acknowledged: dict[str, int]) -> None:
+    """Each robot sends scan after scan, and counts those answered 202, until the server is gone."""
+
+    async def robot(name: str, client: httpx.AsyncClient) -> None:
+        url = f"http://127.0.0.1:{port}/v1/sites/s/robots/{name}/scans"
+        while True:
+            seq = acknowledged.get(name, 0)
+            try:
+                response = await client.post(url, json=_scan(seq))
+            except httpx.TransportError:
+                return
+            assert response.status_code == 202
+            acknowledged[name] = seq + 1
+
+    async with httpx.AsyncClient() as client:
+        await asyncio.gather(*(robot(f"r{number}", client) for number in range(ROBOTS)))
+
+
+def _site(port: int) -> dict[str, Any]:
+    answer: dict[str, Any] = httpx.get(f"http://127.0.0.1:{port}/v1/sites/s").json()
+    return answer
+
+
+def _idle(port: int) -> dict[str, Any]:
+    for _ in range(600):
+        site = _site(port)
+        if site["idle"]:
+            return site
+        time.sleep(0.05)
+    raise AssertionError(f"never idle: {site}")
+
+
+async def _send_and_kill(
+    port: int, process: subprocess.Popen[bytes], acknowledged: dict[str, int], more: int
+) -> None:
+    """SIGKILL the server in the middle of things, after `more` acknowledged scans."""
+    goal = sum(acknowledged.values()) + more
+    sending = asyncio.create_task(_send_until_killed(port, acknowledged))
+    while sum(acknowledged.values()) < goal and not sending.done():
+        await asyncio.sleep(0.001)
+    process.send_signal(signal.SIGKILL)
+    await sending
+    assert sum(acknowledged.values()) >= goal
+
+
+def test_a_killed_server_has_lost_nothing_leaves_no_worker_and_maps_on(tmp_path: Path) -> None:
+    port, acknowledged = _free_port(), dict[str, int]()
+    for more in (130, 71):
+        with _server(tmp_path, port) as process:
+            workers = _children(process.pid)
+            asyncio.run(_send_and_kill(port, process, acknowledged, more))
+            process.wait()
+            _wait_gone(workers)
+    with _server(tmp_path, port) as process:
+        site = _idle(port)
+        assert site["scans"]["accepted"] == site["scans"]["processed"] == site["version"]
+        robots = httpx.get(f"http://127.0.0.1:{port}/v1/sites/s/robots").json()["robots"]
+        for robot in robots:
+            # The last scan may have been stored, and its answer lost with the server.
+            surplus = robot["scans"]["processed"] - acknowledged[robot["robot"]]
+            assert surplus in (0, 1)
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(20) in (0, -signal.SIGTERM)
+
+
+def _children(pid: int) -> list[int]:
+    children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    assert children
+    return [int(child) for child in children]
+
+
+def _wait_gone(processes: list[int]) -> None:
+    for _ in range(500):
+        if not any(_alive(process) for process in processes):
+            return
+        time.sleep(0.02)
+    raise AssertionError("a worker outlived its server")
+
+
+def _alive(pid: int) -> bool:
+    try:
+        return "\nState:\tZ" not in Path(f"/proc/{pid}/status").read_text()
+    except FileNotFoundError:
+        return False
+
+
+def test_a_service_without_protection_does_not_listen_to_the_world(tmp_path: Path) -> None:
+    with pytest.raises(SystemExit, match="nothing protects"):
+        run(Settings(data_dir=tmp_path, host="0.0.0.0"))
