@@ -38,7 +38,7 @@ def join(site: SiteMap, root: int, keyframe: int) -> ComponentMerged | None:
     if share > site.config.join.most_conflict:
         return None
     survivor, absorbed = site.component_id(a_root), site.component_id(b_root)
-    site.graph.move_component(b_root, T_A_B)
+    site.move_component(b_root, T_A_B)
     ids = tuple(c.id for c in chosen)
     for constraint in chosen:
         accepted = constraint.moved_to(

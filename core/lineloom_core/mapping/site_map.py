@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from bisect import bisect_left
 
 import numpy as np
@@ -13,6 +12,7 @@ from lineloom_core.graph import PoseGraph, optimize
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.constraint import Constraint
 from lineloom_core.mapping.keyframe import Keyframe
+from lineloom_core.mapping.positions import Positions
 from lineloom_core.mapping.robot_record import Track
 from lineloom_core.places import Place
 
@@ -31,6 +31,7 @@ class SiteMap:
         self.looped_tracks: dict[int, None] = {}
         self.alias: dict[tuple[int, int], float] = {}
         """By pair of places: how much of one could be mistaken for the other (`distinctive`)."""
+        self._positions = Positions()
         self._numbers = {"keyframe": 0, "track": 0, "place": 0, "constraint": 0}
 
     def number(self, what: str) -> int:
@@ -99,11 +100,22 @@ class SiteMap:
         """The next constraint id."""
         return f"k{self.number('constraint')}"
 
+    def add_node(self, keyframe: int, pose: Pose) -> None:
+        """Put a keyframe into the graph at T_map_laser."""
+        self.graph.add_node(keyframe, pose)
+        self._positions.add(keyframe, pose)
+
+    def move_component(self, keyframe: int, T_new_old: Pose) -> None:
+        """Move the component of a keyframe rigidly: into the frame of the one it joins."""
+        self.graph.move_component(keyframe, T_new_old)
+        self._positions.reset(self.graph.nodes)
+
     def optimise(self, keyframe: int) -> None:
         """Solve the component of a keyframe; its oldest keyframe stays where it is."""
         nodes, edges = self.graph.component_subgraph(keyframe)
         solution = optimize(nodes, edges, anchors=(min(nodes),))
         self.graph.set_poses(solution.poses)
+        self._positions.reset(self.graph.nodes)
 
     def forget(self, robot: str) -> None:
         """Remove a robot's keyframes, tracks and places, and every constraint that touches them."""
@@ -111,6 +123,7 @@ class SiteMap:
         for keyframe in sorted(gone):
             self.graph.remove_node(keyframe)
             del self.keyframes[keyframe]
+        self._positions.reset(self.graph.nodes)
         self.tracks = {t.id: t for t in self.tracks.values() if t.robot != robot}
         self.places = {p.id: p for p in self.places.values() if p.track in self.tracks}
         self.alias = {
@@ -134,17 +147,12 @@ class SiteMap:
 
     def nearby(self, keyframe: int, radius: float) -> list[tuple[int, float]]:
         """Keyframes of the same component within `radius` m, nearest first, with distances."""
-        here = self.pose(keyframe)
         root = self.component_root(keyframe)
-        found = [
-            (math.hypot(pose.x - here.x, pose.y - here.y), other)
-            for other, pose in self.graph.nodes.items()
-            if other != keyframe
-            and abs(pose.x - here.x) <= radius
-            and abs(pose.y - here.y) <= radius
-            and self.graph.component_root(other) == root
+        return [
+            (other, distance)
+            for other, distance in self._positions.within(self.pose(keyframe), radius)
+            if other != keyframe and self.component_root(other) == root
         ]
-        return [(other, d) for d, other in sorted(found) if d <= radius]
 
     def neighbours_on_track(self, keyframe: int, reach: int) -> list[int]:
         """The keyframe and up to `reach` before and after it on its track, itself first."""

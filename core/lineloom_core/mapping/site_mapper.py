@@ -175,12 +175,12 @@ class SiteMapper:
         )
         site.keyframes[keyframe.id] = keyframe
         if not track.keyframes:
-            site.graph.add_node(keyframe.id, Pose.identity())
+            site.add_node(keyframe.id, Pose.identity())
             track.travelled.append(0.0)
         else:
             last = site.keyframes[track.keyframes[-1]]
             T_last_new = last.T_track_laser.between(tracked.pose)
-            site.graph.add_node(keyframe.id, site.pose(last.id) @ T_last_new)
+            site.add_node(keyframe.id, site.pose(last.id) @ T_last_new)
             track.travelled.append(track.travelled[-1] + last.T_track_laser.distance(tracked.pose))
             site.add_constraint(_step(site.new_constraint_id(), last, keyframe, tracked))
         track.keyframes.append(keyframe.id)

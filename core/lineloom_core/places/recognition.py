@@ -37,7 +37,7 @@ class RecognitionConfig:
     rotations: int = 8
     cells: int = 12
     pair_limit: int = 80
-    least_explained: float = 4.0
+    least_explained: float = 5.0
     coarse_keep: int = 16
     fine_keep: int = 4
     most_conflict: float = 0.1
