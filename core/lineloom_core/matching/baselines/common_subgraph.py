@@ -8,9 +8,9 @@ maximum clique is the largest set of features common to both.
 
 Needs no guess.
 
-Departures: exact cliques on real scans grow exponentially, so only the `most_lines` longest lines
-and `most_points` farthest-seen corners enter, and the search stops after `most_cliques` maximal
-cliques (networkx's enumeration; what it had found by then counts). Lines are oriented, so angles
+Departures: exact cliques can grow exponentially, so only the `most_lines` longest lines and
+`most_points` nearest corners enter, and the search stops after `most_cliques` maximal cliques
+(networkx's enumeration; what it had found by then counts). Lines are oriented, so angles
 run over the full turn. A clique of parallel lines alone fixes no translation and is passed over.
 """
 
@@ -45,9 +45,9 @@ class CommonSubgraphConfig:
     least_clique: features that must be common. least_score: from which on the verdict is "match".
     """
 
-    most_lines: int = 10
-    most_points: int = 12
-    most_cliques: int = 400
+    most_lines: int = 14
+    most_points: int = 24
+    most_cliques: int = 5000
     distance: float = 0.12
     angle: float = math.radians(4.0)
     same_point: float = 0.1
@@ -171,9 +171,9 @@ class CommonSubgraphMatcher:
 
 
 def _corners(features: ScanFeatures, same_point: float) -> Array:
-    """Return the edges of thesis §3.3, farthest first, each place once; (p, 2) [m]."""
+    """Return the edges of thesis §3.3, nearest first, each place once; (p, 2) [m]."""
     found = features.edges[features.ends == EDGE].reshape(-1, 2)
-    order = np.argsort(-np.hypot(found[:, 0], found[:, 1]), kind="stable")
+    order = np.argsort(np.hypot(found[:, 0], found[:, 1]), kind="stable")
     kept: list[Array] = []
     for point in found[order]:
         if all(math.dist(point, other) > same_point for other in kept):

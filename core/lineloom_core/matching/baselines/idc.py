@@ -47,7 +47,7 @@ class IdcConfig:
     gate: float = 1.0
     kept: float = 0.8
     iterations: int = 40
-    most_points: int = 360
+    most_points: int = 180
     explained: float = 0.06
     least_score: float = 0.7
     extraction: ExtractionConfig = field(default_factory=ExtractionConfig)

@@ -1,0 +1,187 @@
+"""One benchmark of pairwise matchers: how often right, how sure, how fast.
+
+Every matcher sees the same pairs. What counts as right is told in `evaluation.pairs`; the best
+hypothesis counts whatever the verdict, for it is what the score speaks of. Times are the process's
+CPU time (all threads of it), so that other people on the machine do not show.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from lineloom_core.evaluation.pair_bench_contestants import (
+    Contestant,
+    GuidedMatcher,
+    Kind,
+    Start,
+)
+from lineloom_core.evaluation.pair_bench_sets import BenchPair, BenchSet
+from lineloom_core.evaluation.pairs import is_right, is_right_but_for_a_slide, score_pairs
+from lineloom_core.matching import Matcher
+from lineloom_core.matching.result import MatchResult
+
+
+@dataclass(frozen=True, slots=True)
+class GroupFigures:
+    """Shares of the n pairs of one tier or overlap bin.
+
+    full: the best hypothesis is right. full_or_weak: that, or right in all but the slide that a
+    "weak" verdict declares. confidently_wrong: verdict "match", and wrong.
+    """
+
+    n: int
+    full: float
+    full_or_weak: float
+    confidently_wrong: float
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """What a matcher did on one collection of pairs.
+
+    groups: by tier or overlap bin, in order. confidently_wrong: share of all pairs. recall_*: see
+    `PairScore`. match_ms: median CPU time of a pair whose scans are prepared; whole_ms: with the
+    preparation of both scans [ms].
+    """
+
+    groups: dict[str, GroupFigures]
+    confidently_wrong: float
+    recall_at_1_percent: float
+    recall_at_zero: float
+    match_ms: float
+    whole_ms: float
+
+
+@dataclass(frozen=True, slots=True)
+class BenchRow:
+    """One matcher: its figures by collection and by set, or why there are none (`missing`)."""
+
+    name: str
+    kind: Kind
+    start: Start
+    figures: dict[str, Figures]
+    by_set: dict[str, Figures]
+    missing: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Answer:
+    row: BenchPair
+    result: MatchResult
+    prepare_s: float
+    match_s: float
+
+
+def run_pair_bench(
+    contestants: Iterable[Contestant],
+    sets: Sequence[BenchSet],
+    on_progress: Callable[[str], None] = lambda _: None,
+) -> tuple[BenchRow, ...]:
+    """Run every contestant over every set, from each of its starts; tell who is at work."""
+    rows: list[BenchRow] = []
+    for contestant in contestants:
+        try:
+            matcher = contestant.make()
+        except ImportError as error:
+            reason = str(error)
+            rows += [
+                BenchRow(contestant.name, contestant.kind, start, {}, {}, reason)
+                for start in contestant.starts
+            ]
+            continue
+        for start in contestant.starts:
+            on_progress(contestant.name + (f" from {start}" if start != "none" else ""))
+            rows.append(_run(contestant, matcher, start, sets))
+    return tuple(rows)
+
+
+def figures_of(
+    pairs: Sequence[BenchPair],
+    results: Sequence[MatchResult],
+    prepare_s: Sequence[float],
+    match_s: Sequence[float],
+) -> Figures:
+    """Judge the answers to pairs; times in seconds, one per pair. Raises ValueError for none."""
+    if not pairs:
+        raise ValueError("there are no pairs to judge")
+    judged = [_with_best(result) for result in results]
+    whole = score_pairs([row.pair for row in pairs], judged)
+    groups = {
+        group: _group([(p, r) for p, r in zip(pairs, judged, strict=True) if p.group == group])
+        for group in dict.fromkeys(row.group for row in pairs)
+    }
+    return Figures(
+        groups=groups,
+        confidently_wrong=whole.confidently_wrong,
+        recall_at_1_percent=whole.recall_at_1_percent,
+        recall_at_zero=whole.recall_at_zero,
+        match_ms=1e3 * float(np.median(match_s)),
+        whole_ms=1e3 * float(np.median(np.add(prepare_s, match_s))),
+    )
+
+
+def _run(
+    contestant: Contestant, matcher: Matcher[Any], start: Start, sets: Sequence[BenchSet]
+) -> BenchRow:
+    by_set = {s.name: [_answer(matcher, start, row) for row in _warmed(s.pairs)][1:] for s in sets}
+    collections: dict[str, list[_Answer]] = {}
+    for s in sets:
+        collections.setdefault(s.collection, []).extend(by_set[s.name])
+    return BenchRow(
+        contestant.name,
+        contestant.kind,
+        start,
+        {name: _figures(answers) for name, answers in collections.items()},
+        {name: _figures(answers) for name, answers in by_set.items()},
+    )
+
+
+def _warmed(pairs: Sequence[BenchPair]) -> Iterable[BenchPair]:
+    """The first pair twice: compilers and caches have their turn before the clock counts."""
+    return (*pairs[:1], *pairs)
+
+
+def _answer(matcher: Matcher[Any], start: Start, row: BenchPair) -> _Answer:
+    begin = time.process_time()
+    reference, current = matcher.prepare(row.pair.reference), matcher.prepare(row.pair.current)
+    prepared = time.process_time()
+    if start == "guess" and isinstance(matcher, GuidedMatcher):
+        result = matcher.match_from(reference, current, row.guess)
+    else:
+        result = matcher.match_prepared(reference, current)
+    end = time.process_time()
+    return _Answer(row, result, prepared - begin, end - prepared)
+
+
+def _figures(answers: Sequence[_Answer]) -> Figures:
+    return figures_of(
+        [a.row for a in answers],
+        [a.result for a in answers],
+        [a.prepare_s for a in answers],
+        [a.match_s for a in answers],
+    )
+
+
+def _with_best(result: MatchResult) -> MatchResult:
+    """Let the best hypothesis stand where the verdict withholds it, with the verdict kept."""
+    if result.T_reference_current is None and result.best is not None:
+        return replace(result, T_reference_current=result.best)
+    return result
+
+
+def _group(rows: Sequence[tuple[BenchPair, MatchResult]]) -> GroupFigures:
+    right = [is_right(row.pair, result) for row, result in rows]
+    slides = [is_right_but_for_a_slide(row.pair, result) for row, result in rows]
+    matches = [result.verdict == "match" for _, result in rows]
+    n = len(rows)
+    return GroupFigures(
+        n=n,
+        full=sum(right) / n,
+        full_or_weak=sum(a or b for a, b in zip(right, slides, strict=True)) / n,
+        confidently_wrong=sum(m and not r for m, r in zip(matches, right, strict=True)) / n,
+    )

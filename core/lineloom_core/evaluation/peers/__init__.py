@@ -1,0 +1,12 @@
+"""Other people's matchers from PyPI behind our interface (dependency group `peers`).
+
+Each is loaded when it is made; `ImportError` says that it is not installed. They are given the best
+chance we found: how a flat scan is fed to each is told at the top of its file.
+"""
+
+from lineloom_core.evaluation.peers.karto import KartoMatcher
+from lineloom_core.evaluation.peers.kiss_matcher_quatro import KissMatcherMatcher
+from lineloom_core.evaluation.peers.open3d_fpfh import Open3dMatcher
+from lineloom_core.evaluation.peers.small_gicp_icp import SmallGicpMatcher
+
+__all__ = ["KartoMatcher", "KissMatcherMatcher", "Open3dMatcher", "SmallGicpMatcher"]
