@@ -119,25 +119,25 @@ def test_status_and_replay_work_from_the_shell(
 
 
 def test_the_outbox_rides_out_the_death_of_the_service(
-    drive: list[SimulatedScan], tmp_path: Path
+    service: ChildService, drive: list[SimulatedScan], tmp_path: Path
 ) -> None:
-    data = tmp_path / "data"
-    first = ChildService(data)
-    with Client(first.url, retry=RetryPolicy(attempts=1)) as client, first:
-        first.wait_until_ready()
-        quick = RetryPolicy(first_delay=0.05, max_delay=0.2)
-        with Outbox(tmp_path / "o.db", client, "s", "r", batch=5, retry=quick) as outbox:
-            for entry in drive[:30]:
-                outbox.put(entry.scan)
-            assert first.pid is not None
-            os.killpg(first.pid, signal.SIGKILL)
-            for entry in drive[30:]:
-                outbox.put(entry.scan)
-            with ChildService(data, first.port) as second:
-                second.wait_until_ready()
-                outbox.flush(timeout=30.0)
-                state = client.wait_until_idle("s", timeout=60.0)
-                assert state.scans.accepted == SCANS
-                poses = client.trajectory("s", "r").poses
-                assert [pose.seq for pose in poses] == list(range(SCANS))
-                assert outbox.stats().pending == 0
+    quick = RetryPolicy(first_delay=0.05, max_delay=0.2)
+    with (
+        Client(service.url, retry=RetryPolicy(attempts=1)) as client,
+        Outbox(tmp_path / "o.db", client, "death", "r", batch=5, retry=quick) as outbox,
+    ):
+        for entry in drive[:30]:
+            outbox.put(entry.scan)
+        assert service.pid is not None
+        os.killpg(service.pid, signal.SIGKILL)
+        for entry in drive[30:]:
+            outbox.put(entry.scan)
+        service.stop()
+        service.start()
+        service.wait_until_ready()
+        outbox.flush(timeout=30.0)
+        state = client.wait_until_idle("death", timeout=60.0)
+        assert state.scans.accepted == SCANS
+        poses = client.trajectory("death", "r").poses
+        assert [pose.seq for pose in poses] == list(range(SCANS))
+        assert outbox.stats().pending == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import httpx
 import pytest
 from lineloom import Client
 from lineloom.cli import watch
@@ -27,13 +28,18 @@ def site(processed: int, merged: dict[str, str]) -> Site:
 
 
 def test_merges_and_progress_are_told(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], loopback: str
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    loopback: str,
+    fake: FakeService,
 ) -> None:
     monkeypatch.setattr(watch, "_LINE_S", 0.0)
-    with Client(loopback) as client, Watch(client, "s", 90, already=10) as shown:
-        shown.on_site(site(40, {}))
-        shown.on_site(site(60, {"c2": "c1"}))
-        shown.on_site(site(70, {"c2": "c1"}))
+    before = site(10, {"c9": "c1"}).model_dump()
+    fake.routes["GET", "/v1/sites/s"] = lambda request: httpx.Response(200, json=before)
+    with Client(loopback) as client, Watch(client, "s", 90) as shown:
+        shown.on_site(site(40, {"c9": "c1"}))
+        shown.on_site(site(60, {"c9": "c1", "c2": "c1"}))
+        shown.on_site(site(70, {"c9": "c1", "c2": "c1"}))
     told = capsys.readouterr().err.splitlines()
     assert told == [
         "sent 0 of 90, mapped 30, 3 components",
@@ -48,4 +54,4 @@ def test_the_service_is_asked_now_and_then_only(loopback: str, fake: FakeService
         for sent in range(50):
             # The site is not there yet: that is no reason to stop.
             shown.on_sent(Played(sent=sent))
-    assert len(fake.requests) == 1
+    assert len(fake.requests) == 2  # at the start, and once on the way

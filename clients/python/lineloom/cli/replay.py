@@ -19,7 +19,6 @@ from lineloom.cli.schedule import Stream, robot_name, split, together
 from lineloom.cli.summary import Summary, complain
 from lineloom.cli.watch import Watch
 from lineloom.client import Client
-from lineloom.errors import NotFoundError
 from lineloom.scan_like import to_wire
 from lineloom.wire import Scan
 
@@ -64,9 +63,8 @@ def replay(
     total = sum(len(stream.scans) for stream in streams)
     with Client(url, token=token, retry=patient()) as client:
         require_ready(client)
-        already = _processed(client, site)
         begin = time.monotonic()
-        with Watch(client, site, total, already=already) as watch:
+        with Watch(client, site, total) as watch:
             player = Player(client, site, batch=batch, speed=speed, on_sent=watch.on_sent)
             played = player.play(together(streams))
             if played.accepted + played.duplicates == 0:
@@ -131,11 +129,3 @@ def _session(path: Path) -> str:
     """Return a session that is the log's own: again the same, and never another log's."""
     with path.open("rb") as content:
         return f"log-{hashlib.file_digest(content, 'blake2b').hexdigest()[:12]}"
-
-
-def _processed(client: Client, site: str) -> int:
-    try:
-        scans = client.site(site).scans
-    except NotFoundError:
-        return 0
-    return scans.processed + scans.skipped

@@ -47,13 +47,15 @@ class Summary:
 
     @property
     def scans_per_s(self) -> float:
-        """Scans in the map per second, from the first POST until the map was idle."""
-        return self.sent / self.elapsed_s if self.elapsed_s > 0.0 else 0.0
+        """New scans per second, from the first POST until the map was idle."""
+        return self.accepted / self.elapsed_s if self.elapsed_s > 0.0 else 0.0
 
     @property
     def times_real_time(self) -> float:
-        """How much faster than driving."""
-        return self.driven_s / self.elapsed_s if self.elapsed_s > 0.0 else 0.0
+        """How much faster than driving; scans that were there before do not count."""
+        if self.elapsed_s <= 0.0 or self.sent == 0:
+            return 0.0
+        return self.driven_s * self.accepted / self.sent / self.elapsed_s
 
     def to_json(self) -> dict[str, Any]:
         """Return the figures for scripts."""

@@ -24,11 +24,11 @@ class Watch:
     Where stderr is no terminal, as under CI, a line every few seconds stands for the bars.
     """
 
-    def __init__(self, client: Client, site: str, total: int, *, already: int = 0) -> None:
+    def __init__(self, client: Client, site: str, total: int) -> None:
         self._client = client
         self._site = site
         self._total = total
-        self._already = already
+        self._already = 0
         self._sent_count = 0
         self._asked_at = 0.0
         self._told_at = time.monotonic()
@@ -46,6 +46,14 @@ class Watch:
         self._mapped = self._progress.add_task("mapped", total=total, state="")
 
     def __enter__(self) -> Self:
+        # What was there before is not this play's doing.
+        try:
+            before = self._client.site(self._site)
+        except NotFoundError:
+            pass
+        else:
+            self._already = before.scans.processed + before.scans.skipped
+            self._merged |= before.merged_into.keys()
         self._progress.start()
         return self
 
