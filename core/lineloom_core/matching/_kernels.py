@@ -513,19 +513,20 @@ def judge_point(x, y, ranges, angle_min, per_radian, turn, base, slope):  # type
 
 @njit(cache=True)
 def judge_points(  # type: ignore[no-untyped-def]
-    points, step, pose, ranges, angle_min, angle_increment, base, slope, counts
+    points, spacing, step, pose, ranges, angle_min, angle_increment, base, slope, counts
 ):
     """Step 5, one way: hold points, moved by `pose`, against a sweep in polar form.
 
     counts[MATCHED, CONFLICT, OCCLUDED, OUTSIDE] grow by each point's weight, its share of wall:
-    the spacing of neighbouring beams there, at most 5 cm, so that near clutter does not outvote.
+    the distance of neighbouring beams there, at most 5 cm, so that near clutter does not outvote.
+    spacing: angle between the beams that measured the points, which may be of another lidar.
     """
     c, s = math.cos(pose[2]), math.sin(pose[2])
     per_radian = 1.0 / angle_increment
     turn = 2.0 * math.pi * per_radian
     for k in range(0, points.shape[0], step):
         px, py = points[k, 0], points[k, 1]
-        w = min(math.sqrt(px * px + py * py) * angle_increment, 0.05)
+        w = min(math.sqrt(px * px + py * py) * spacing, 0.05)
         x = c * px - s * py + pose[0]
         y = s * px + c * py + pose[1]
         counts[judge_point(x, y, ranges, angle_min, per_radian, turn, base, slope)] += w
@@ -598,10 +599,10 @@ def judge_pair(  # type: ignore[no-untyped-def]
 ):
     """Free-space check both ways between two single sweeps; counts (4,) is overwritten."""
     counts[:] = 0.0
-    judge_points(cur_points, step, pose, ref_ranges, ref_min, ref_inc, base, slope, counts)
+    judge_points(cur_points, cur_inc, step, pose, ref_ranges, ref_min, ref_inc, base, slope, counts)
     back = np.empty(3)
     invert_pose(pose, back)
-    judge_points(ref_points, step, back, cur_ranges, cur_min, cur_inc, base, slope, counts)
+    judge_points(ref_points, ref_inc, step, back, cur_ranges, cur_min, cur_inc, base, slope, counts)
 
 
 @njit(cache=True)
