@@ -52,6 +52,7 @@ async def _serve(settings: Settings) -> None:
             host=settings.host,
             port=settings.port,
             log_config=None,
+            proxy_headers=False,
             access_log=settings.log_level == "debug",
             timeout_graceful_shutdown=_SHUTDOWN_S,
         )

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import uvicorn
+import uvloop
 from lineloom_service.app import create_app
 from lineloom_service.engine.local_engine import LocalEngine
 from lineloom_service.service import Service
@@ -19,11 +20,14 @@ async def _serve(directory: Path, port: int) -> None:
     service = Service(settings, engine=engine)
     await service.start()
     try:
-        config = uvicorn.Config(create_app(service=service), port=port, log_level="warning")
+        config = uvicorn.Config(
+            create_app(service=service), port=port, log_level="warning", proxy_headers=False
+        )
         await uvicorn.Server(config).serve()
     finally:
         await service.stop()
 
 
 if __name__ == "__main__":
-    asyncio.run(_serve(Path(sys.argv[1]), int(sys.argv[2])))
+    with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
+        runner.run(_serve(Path(sys.argv[1]), int(sys.argv[2])))
