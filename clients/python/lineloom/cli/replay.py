@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-import time
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from lineloom.cli import options
-from lineloom.cli.console import note, print_json
+from lineloom.cli.console import note
 from lineloom.cli.failure import CommandError, Exit
-from lineloom.cli.patience import patient, require_ready
-from lineloom.cli.player import Player
+from lineloom.cli.play import Stage, report
 from lineloom.cli.scan_files import read_scans
 from lineloom.cli.schedule import Stream, robot_name, split, together
-from lineloom.cli.summary import Summary, complain
-from lineloom.cli.watch import Watch
-from lineloom.client import Client
 from lineloom.scan_like import to_wire
 from lineloom.wire import Scan
 
@@ -60,29 +55,15 @@ def replay(
       lineloom replay mit-csail.clf --split 3 --no-odometry --site csail
     """
     streams = load(logs, split_into=split_into, robot=robot, odometry=not no_odometry)
-    total = sum(len(stream.scans) for stream in streams)
-    with Client(url, token=token, retry=patient()) as client:
-        require_ready(client)
-        begin = time.monotonic()
-        with Watch(client, site, total) as watch:
-            player = Player(client, site, batch=batch, speed=speed, on_sent=watch.on_sent)
-            played = player.play(together(streams))
-            if played.accepted + played.duplicates == 0:
-                complain(played)
-                raise CommandError(f"the service refused all {played.sent} scans")
-            state = client.wait_until_idle(site, timeout, on_poll=watch.on_site)
-    summary = Summary.of(
-        state,
-        played,
+    stage = Stage(site, url, token, batch, speed, timeout)
+    summary = stage.play(
+        together(streams),
+        total=sum(len(stream.scans) for stream in streams),
         robots=len(streams),
         driven_s=sum(stream.duration for stream in streams),
-        elapsed_s=time.monotonic() - begin,
     )
-    complain(played)
-    if json:
-        print_json(summary.to_json())
-    else:
-        summary.show()
+    report(summary, json=json)
+    if not json:
         note(f"See it: lineloom map --site {site} --format svg --output map.svg")
 
 

@@ -11,14 +11,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from lineloom.cli import options
-from lineloom.cli.console import note, print_json
+from lineloom.cli.console import note
 from lineloom.cli.failure import CommandError, Exit
-from lineloom.cli.patience import patient, require_ready
-from lineloom.cli.player import Player
+from lineloom.cli.play import Stage, report
 from lineloom.cli.schedule import Due
-from lineloom.cli.summary import Summary, complain
-from lineloom.cli.watch import Watch
-from lineloom.client import Client
 from lineloom.scan_like import to_wire
 
 if TYPE_CHECKING:
@@ -95,25 +91,11 @@ def simulate(
         _write(fleet, output)
         return
     session = f"sim-{world_seed}-{seed}-{int(time.time())}"
-    with Client(url, token=token, retry=patient()) as client:
-        require_ready(client)
-        begin = time.monotonic()
-        with Watch(client, site, scan_count(fleet)) as watch:
-            player = Player(client, site, batch=batch, speed=speed, on_sent=watch.on_sent)
-            played = player.play(due(fleet, session))
-            state = client.wait_until_idle(site, timeout, on_poll=watch.on_site)
-    summary = Summary.of(
-        state,
-        played,
-        robots=robots,
-        driven_s=robots * duration,
-        elapsed_s=time.monotonic() - begin,
+    stage = Stage(site, url, token, batch, speed, timeout)
+    summary = stage.play(
+        due(fleet, session), total=scan_count(fleet), robots=robots, driven_s=robots * duration
     )
-    complain(played)
-    if json:
-        print_json(summary.to_json())
-    else:
-        summary.show()
+    report(summary, json=json)
 
 
 def build_fleet(
@@ -140,12 +122,9 @@ def build_fleet(
         raise CommandError(
             "the simulator is part of the core: `pip install lineloom-client[server]`"
         ) from None
+    built_in = world in world_names() or not Path(world).exists()
     try:
-        floor = (
-            world_named(world, world_seed)
-            if world in world_names() or not Path(world).exists()
-            else World.from_text(world)
-        )
+        floor = world_named(world, world_seed) if built_in else World.from_text(world)
         return Fleet.touring(
             floor,
             robots=robots,
