@@ -146,9 +146,10 @@ def score_pairs(pairs: Sequence[Pair], results: Sequence[MatchResult]) -> PairSc
 
 def is_right(pair: Pair, result: MatchResult) -> bool:
     """Tell whether the best hypothesis is the true pose; never in the neg tier."""
-    if pair.tier == "neg" or result.T_reference_current is None:
+    found = result.best if result.best is not None else result.T_reference_current
+    if pair.tier == "neg" or found is None:
         return False
-    error = pose_error(result.T_reference_current, pair.T_ref_cur)
+    error = pose_error(found, pair.T_ref_cur)
     return error.translation < TRANSLATION_LIMIT_M and error.rotation < ROTATION_LIMIT_RAD
 
 

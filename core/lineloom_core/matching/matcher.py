@@ -3,6 +3,7 @@
 Steps: 1-3. rotations by the histogram of direction differences, translations by votes of line
 pairs, ranking by explained length; 4. refinement; 5. free space both ways; 6. observability;
 7. uniqueness; 8. calibrated score. Steps 1 to 5 run in one kernel (`_kernels.match_sweeps`).
+Where no full pose convinces, two scans of one corridor may still share its walls (`band`).
 
 Beyond the thesis (chapters 4 and 5): directions are compared first and translations are voted
 for, instead of counting equal relations in a matching table; every hypothesis is verified
@@ -12,7 +13,7 @@ against what both scans saw through, and the answer may be "weak" or "ambiguous"
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from lineloom_core.features import ExtractionConfig, ScanFeatures, extract_features
 from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.matching import _kernels
+from lineloom_core.matching.band import best_band
 from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
 from lineloom_core.matching.result import Alternative, LinePair, MatchResult, Verdict
 from lineloom_core.matching.score import probability
@@ -87,7 +89,8 @@ class LineMatcher:
             return _none("fewer than two line segments in a scan")
         table = self._hypotheses(reference, current)
         if len(table) == 0:
-            return _none("no rotation and translation that two line pairs agree on")
+            refused = _none("no rotation and translation that two line pairs agree on")
+            return self._or_band(reference, current, refused)
         best = table[0]
         pose = Pose.from_array(best[:3])
         information = _information(best)
@@ -96,7 +99,7 @@ class LineMatcher:
         checks = _checks(best, rivals, lambda_min)
         score = probability(checks)
         verdict, reason = self._verdict(checks, score, weak_direction)
-        return MatchResult(
+        result = MatchResult(
             verdict=verdict,
             T_reference_current=None if verdict == "none" else pose,
             weak_direction=weak_direction if verdict == "weak" else None,
@@ -109,6 +112,28 @@ class LineMatcher:
             alternatives=tuple(
                 Alternative(Pose.from_array(r[:3]), score * _ratio(r, best)) for r in rivals
             ),
+        )
+        return self._or_band(reference, current, result)
+
+    def _or_band(
+        self, reference: ScanFeatures, current: ScanFeatures, result: MatchResult
+    ) -> MatchResult:
+        """Where no full pose convinces: the same two parallel walls are an answer all the same."""
+        if result.verdict in {"match", "weak"}:
+            return result
+        band = best_band(reference, current)
+        if band is None or not band.convincing:
+            return result
+        pose = band.T_reference_current
+        return replace(
+            result,
+            verdict="weak",
+            T_reference_current=pose,
+            weak_direction=band.direction,
+            covariance=band.covariance(),
+            reason="only parallel walls are shared: the position along them is not known",
+            pairs=line_pairs(reference, current, pose),
+            checks={**result.checks, **band.checks()},
         )
 
     def _hypotheses(self, r: ScanFeatures, c: ScanFeatures) -> NDArray[np.float64]:
