@@ -44,6 +44,8 @@ class RobotRecord:
     track: Track | None = None
     state: RobotState = "starting"
     session: str | None = None
+    sessions: dict[str, None] = field(default_factory=dict)
+    """All sessions seen, in their order."""
     seq: int | None = None
     stamp: float | None = None
     processed: int = 0

@@ -36,7 +36,7 @@ from lineloom_core.matching.local_map import Cloud, LocalMap
 from lineloom_core.places import Glimpse, Place
 from lineloom_core.scan import Mount, Scan
 
-SNAPSHOT_FORMAT = 1
+SNAPSHOT_FORMAT = 2
 _CLOSURES_UNSOLVED = 6
 
 
@@ -71,6 +71,7 @@ class SiteMapper:
             return self._back_fill(record, scan, cloud)
         if scan.session != record.session:
             record.tracker = None  # restarted: it may have been carried anywhere
+            record.sessions[scan.session] = None
         record.session, record.seq, record.stamp = scan.session, scan.seq, scan.stamp
         if len(features.points) == 0:
             record.unplaced += 1
@@ -269,8 +270,10 @@ class SiteMapper:
 
 
 def _is_late(record: RobotRecord, scan: Scan) -> bool:
-    """Whether newer scans of the same session have been processed already."""
-    return record.session == scan.session and record.seq is not None and scan.seq < record.seq
+    """Whether newer scans have been processed already, of its session or of a younger one."""
+    if scan.session != record.session:
+        return scan.session in record.sessions
+    return record.seq is not None and scan.seq < record.seq
 
 
 def _laser_odometry(record: RobotRecord, scan: Scan) -> Pose | None:
