@@ -13,7 +13,9 @@ from lineloom_core.matching._kernels import (
     LONG_ENOUGH,
     MATCHED,
     compatible_pairs,
+    evidence,
     judge_pair,
+    refine,
     rotation_peaks,
     wrap_angle,
 )
@@ -140,3 +142,63 @@ def slide_band(  # type: ignore[no-untyped-def]
         if value > best[3]:
             best[0], best[1], best[3] = pose[0], pose[1], value
     return best
+
+
+@njit(cache=True)
+def match_bands(  # type: ignore[no-untyped-def]
+    ref,
+    ref_ends,
+    ref_edges,
+    ref_points,
+    ref_ranges,
+    ref_min,
+    ref_inc,
+    cur,
+    cur_ends,
+    cur_edges,
+    cur_points,
+    cur_ranges,
+    cur_min,
+    cur_inc,
+    rotations,
+    per_rotation,
+    window,
+    tried,
+    farthest,
+    step,
+    iterations,
+    base,
+    slope,
+):
+    """Bands slid to where free space likes them, refined and judged; best evidence first.
+
+    Rows: the 16 columns of `_kernels.match_sweeps` (explained and votes are the band's weight),
+    then the band's axis, weight, and whether both sides were seen.
+    """
+    bands = propose_bands(ref, cur, rotations, per_rotation, window)
+    n = min(bands.shape[0], tried)
+    out = np.empty((n, 19))
+    H = np.empty((3, 3))
+    counts = np.empty(4)
+    rank = np.empty(n)
+    for k in range(n):
+        phi, axis, across, weight, both = bands[k]
+        slid = slide_band(
+            ref_points, ref_ranges, ref_min, ref_inc, cur_points, cur_ranges, cur_min, cur_inc,
+            phi, axis, across, farthest, step, base, slope,
+        )  # fmt: skip
+        pose = slid[:3].copy()
+        overlap = refine(ref, ref_ends, ref_edges, cur, cur_ends, cur_edges, pose, H, iterations)
+        judge_pair(
+            ref_points, ref_ranges, ref_min, ref_inc, cur_points, cur_ranges, cur_min, cur_inc,
+            pose, 1, base, slope, counts,
+        )  # fmt: skip
+        out[k, :3] = pose
+        out[k, 3], out[k, 4] = weight, weight
+        out[k, 5:9] = counts
+        out[k, 9] = overlap
+        out[k, 10], out[k, 11], out[k, 12] = H[0, 0], H[0, 1], H[0, 2]
+        out[k, 13], out[k, 14], out[k, 15] = H[1, 1], H[1, 2], H[2, 2]
+        out[k, 16], out[k, 17], out[k, 18] = axis, weight, both
+        rank[k] = evidence(out[k])
+    return out[np.argsort(-rank, kind="mergesort")]

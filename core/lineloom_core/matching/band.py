@@ -16,24 +16,19 @@ from numpy.typing import NDArray
 from lineloom_core.features import ScanFeatures
 from lineloom_core.geometry import Pose
 from lineloom_core.matching import _band_kernels
-from lineloom_core.matching.free_space import (
-    TOLERANCE,
-    TOLERANCE_SLOPE,
-    FreeSpaceCheck,
-    judge_sweeps,
-)
+from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
 
 ROTATIONS = 8
 PER_ROTATION = 3
 WINDOW = 0.15
 TRIED = 6
 FARTHEST_SLIDE = 6.0
-SLIDE_STEP = 0.4
+SLIDE_STEP = 0.3
+ITERATIONS = 4
 LEAST_WEIGHT = 2.0
 LEAST_MATCHED = 2.5
 MOST_CONFLICT = 0.12
 SIGMAS = (10.0, 0.06, 0.02)  # m along, m across, rad
-PHI, AXIS, ACROSS, WEIGHT, BOTH_SIDES = range(5)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,14 +36,16 @@ class Band:
     """A match up to a slide along `direction` [rad, reference frame, 0..pi).
 
     weight: metres of parallel wall that agree on the offset across (both sides count more).
-    both_sides: walls of both facings take part, so the corridor's width fits as well.
+    both_sides: walls of both facings take part, so the corridor's width fits as well. matched,
+    conflict_share: what free space says, in metres of wall and as a share.
     """
 
     T_reference_current: Pose
     direction: float
     weight: float
     both_sides: bool
-    free_space: FreeSpaceCheck
+    matched: float
+    conflict_share: float
 
     @property
     def convincing(self) -> bool:
@@ -56,8 +53,8 @@ class Band:
         return (
             self.both_sides
             and self.weight >= LEAST_WEIGHT
-            and self.free_space.matched >= LEAST_MATCHED
-            and self.free_space.conflict_share <= MOST_CONFLICT
+            and self.matched >= LEAST_MATCHED
+            and self.conflict_share <= MOST_CONFLICT
         )
 
     def covariance(self) -> NDArray[np.float64]:
@@ -71,35 +68,30 @@ class Band:
         """The figures behind `convincing`."""
         return {
             "band_weight_m": self.weight,
-            "band_matched_m": self.free_space.matched,
-            "band_conflict_share": self.free_space.conflict_share,
+            "band_matched_m": self.matched,
+            "band_conflict_share": self.conflict_share,
         }
 
 
-def best_band(reference: ScanFeatures, current: ScanFeatures) -> Band | None:
-    """The band that walls and free space speak for most; None where no lines are parallel."""
-    table = _band_kernels.propose_bands(
-        reference.lines, current.lines, ROTATIONS, PER_ROTATION, WINDOW
-    )
-    best: tuple[float, int, Pose] | None = None
-    for k in range(min(len(table), TRIED)):
-        row = table[k]
-        slid = _band_kernels.slide_band(
-            reference.points, reference.ranges, reference.angle_min, reference.angle_increment,
-            current.points, current.ranges, current.angle_min, current.angle_increment,
-            row[PHI], row[AXIS], row[ACROSS], FARTHEST_SLIDE, SLIDE_STEP,
-            TOLERANCE, TOLERANCE_SLOPE,
-        )  # fmt: skip
-        value = float(slid[3] + row[WEIGHT])
-        if best is None or value > best[0]:
-            best = value, k, Pose.from_array(slid[:3])
-    if best is None:
-        return None
-    _, k, pose = best
+def band_hypotheses(r: ScanFeatures, c: ScanFeatures) -> NDArray[np.float64]:
+    """Rows as `_band_kernels.match_bands` gives them, best first."""
+    table: NDArray[np.float64] = _band_kernels.match_bands(
+        r.lines, r.ends, r.edges, r.points, r.ranges, r.angle_min, r.angle_increment,
+        c.lines, c.ends, c.edges, c.points, c.ranges, c.angle_min, c.angle_increment,
+        ROTATIONS, PER_ROTATION, WINDOW, TRIED, FARTHEST_SLIDE, SLIDE_STEP, ITERATIONS,
+        TOLERANCE, TOLERANCE_SLOPE,
+    )  # fmt: skip
+    return table
+
+
+def as_band(row: NDArray[np.float64]) -> Band:
+    """The band that a row describes."""
+    matched, conflict = float(row[5]), float(row[6])
     return Band(
-        T_reference_current=pose,
-        direction=float(np.mod(table[k, AXIS], math.pi)),
-        weight=float(table[k, WEIGHT]),
-        both_sides=bool(table[k, BOTH_SIDES]),
-        free_space=judge_sweeps(reference, current, pose),
+        T_reference_current=Pose.from_array(row[:3]),
+        direction=float(row[16]) % math.pi,
+        weight=float(row[17]),
+        both_sides=bool(row[18]),
+        matched=matched,
+        conflict_share=conflict / max(matched + conflict, 1e-9),
     )

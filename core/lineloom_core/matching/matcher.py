@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from lineloom_core.features import ExtractionConfig, ScanFeatures, extract_features
 from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.matching import _kernels
-from lineloom_core.matching.band import best_band
+from lineloom_core.matching.band import Band, as_band, band_hypotheses
 from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
 from lineloom_core.matching.result import Alternative, LinePair, MatchResult, Verdict
 from lineloom_core.matching.score import probability
@@ -88,9 +88,26 @@ class LineMatcher:
         if len(reference) < 2 or len(current) < 2:
             return _none("fewer than two line segments in a scan")
         table = self._hypotheses(reference, current)
+        result = self._decide(reference, current, table)
+        if result.verdict in {"match", "weak"}:
+            return result
+        bands = band_hypotheses(reference, current)
+        if len(bands) == 0:
+            return result
+        result = self._decide(reference, current, _by_evidence(table, bands))
+        if result.verdict == "match":
+            return result
+        band = next((b for b in map(as_band, bands) if b.convincing), None)
+        if band is None:
+            return _unsure(result)
+        return _as_weak(result, band, line_pairs(reference, current, band.T_reference_current))
+
+    def _decide(
+        self, reference: ScanFeatures, current: ScanFeatures, table: NDArray[np.float64]
+    ) -> MatchResult:
+        """Steps 6 to 8 on a table of hypotheses, best first."""
         if len(table) == 0:
-            refused = _none("no rotation and translation that two line pairs agree on")
-            return self._or_band(reference, current, refused)
+            return _none("no rotation and translation that two line pairs agree on")
         best = table[0]
         pose = Pose.from_array(best[:3])
         information = _information(best)
@@ -99,7 +116,7 @@ class LineMatcher:
         checks = _checks(best, rivals, lambda_min)
         score = probability(checks)
         verdict, reason = self._verdict(checks, score, weak_direction)
-        result = MatchResult(
+        return MatchResult(
             verdict=verdict,
             T_reference_current=None if verdict == "none" else pose,
             weak_direction=weak_direction if verdict == "weak" else None,
@@ -112,28 +129,6 @@ class LineMatcher:
             alternatives=tuple(
                 Alternative(Pose.from_array(r[:3]), score * _ratio(r, best)) for r in rivals
             ),
-        )
-        return self._or_band(reference, current, result)
-
-    def _or_band(
-        self, reference: ScanFeatures, current: ScanFeatures, result: MatchResult
-    ) -> MatchResult:
-        """Where no full pose convinces: the same two parallel walls are an answer all the same."""
-        if result.verdict in {"match", "weak"}:
-            return result
-        band = best_band(reference, current)
-        if band is None or not band.convincing:
-            return result
-        pose = band.T_reference_current
-        return replace(
-            result,
-            verdict="weak",
-            T_reference_current=pose,
-            weak_direction=band.direction,
-            covariance=band.covariance(),
-            reason="only parallel walls are shared: the position along them is not known",
-            pairs=line_pairs(reference, current, pose),
-            checks={**result.checks, **band.checks()},
         )
 
     def _hypotheses(self, r: ScanFeatures, c: ScanFeatures) -> NDArray[np.float64]:
@@ -178,6 +173,42 @@ class LineMatcher:
         if score < config.least_score:
             return "none", f"the best hypothesis is right with a probability of only {score:.2f}"
         return "match", "all checks passed"
+
+
+def _by_evidence(table: NDArray[np.float64], bands: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Both kinds of hypotheses in one table, best first; equals keep their order."""
+    joined = np.vstack([table, bands[:, : table.shape[1]]])
+    rank = np.array([_kernels.evidence(row) for row in joined])
+    ordered: NDArray[np.float64] = joined[np.argsort(-rank, kind="stable")]
+    return ordered
+
+
+def _unsure(result: MatchResult) -> MatchResult:
+    """A lone wall may be any wall: not even a weak answer."""
+    if result.verdict != "weak":
+        return result
+    return replace(
+        result,
+        verdict="none",
+        T_reference_current=None,
+        weak_direction=None,
+        covariance=None,
+        reason="too little is shared to tell one wall from another",
+    )
+
+
+def _as_weak(result: MatchResult, band: Band, pairs: tuple[LinePair, ...]) -> MatchResult:
+    """The same two parallel walls are an answer where no full pose convinces."""
+    return replace(
+        result,
+        verdict="weak",
+        T_reference_current=band.T_reference_current,
+        weak_direction=band.direction,
+        covariance=band.covariance(),
+        reason="only parallel walls are shared: the position along them is not known",
+        pairs=pairs,
+        checks={**result.checks, **band.checks()},
+    )
 
 
 def line_pairs(reference: ScanFeatures, current: ScanFeatures, pose: Pose) -> tuple[LinePair, ...]:
