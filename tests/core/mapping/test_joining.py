@@ -1,0 +1,223 @@
+"""Joining two components: what convinces, what does not, and that it is then right."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from lineloom_core.geometry import Pose
+from lineloom_core.graph import chi_squared
+from lineloom_core.mapping.changes import ComponentMerged
+from lineloom_core.mapping.config import MapperConfig
+from lineloom_core.mapping.constraint import Constraint
+from lineloom_core.mapping.joining import join
+from lineloom_core.mapping.site_map import SiteMap
+from lineloom_core.places import Place
+from lineloom_core.simulation import SimulatedRobot, SimulatedScan, rooms, sick_lms200
+
+from tests.core.mapping.sites import lay_places, lay_track, link, thinned
+
+BEGIN_B = Pose(7.0, -3.0, 1.0)
+"""Where the second component's frame puts its robot: as arbitrary as such frames are."""
+STRONG = 150.0
+"""Metres of wall: more than any two places of these rooms have in common by mistake."""
+
+
+@dataclass
+class Meeting:
+    """Two robots that drove the same way and have not been joined."""
+
+    site: SiteMap
+    a: list[int]
+    b: list[int]
+    places_a: list[Place]
+    places_b: list[Place]
+
+    def candidate(
+        self, i: int, off: Pose | None = None, *, turned: bool = False, evidence: float = STRONG
+    ) -> Constraint:
+        """A candidate between the i-th places of both; `off`: T_true_said at b's end."""
+        a, b = self.places_a[i], self.places_b[i]
+        T_a_b = self.true(a.anchor).between(self.true(b.anchor)) @ (off or Pose.identity())
+        if turned:
+            T_b_a = T_a_b.inverse()
+            return link(
+                self.site, b.anchor, a.anchor, T_b_a, places=(b.id, a.id), evidence=evidence
+            )
+        return link(self.site, a.anchor, b.anchor, T_a_b, places=(a.id, b.id), evidence=evidence)
+
+    def true(self, keyframe: int) -> Pose:
+        """Where the keyframe is in the frame that both have in truth."""
+        return self.site.keyframes[keyframe].T_track_laser
+
+    def join(self) -> ComponentMerged | None:
+        return join(self.site, self.a[0], self.b[-1])
+
+    def worst_error(self) -> float:
+        return max(self.site.pose(k).distance(self.true(k)) for k in self.a + self.b)
+
+
+@pytest.fixture(scope="module")
+def drives() -> tuple[list[SimulatedScan], list[SimulatedScan]]:
+    robot = SimulatedRobot.wandering("a", rooms(2), lidar=sick_lms200(), seed=3, duration_s=60.0)
+    first, second = list(robot.scans()), list(replace(robot, name="b", seed=77).scans())
+    return thinned(first), thinned(second)
+
+
+@pytest.fixture
+def meeting(drives: tuple[list[SimulatedScan], list[SimulatedScan]]) -> Meeting:
+    site = SiteMap(MapperConfig())
+    a = lay_track(site, drives[0], robot="a")
+    b = lay_track(site, drives[1], robot="b", begin=BEGIN_B)
+    return Meeting(site, a, b, lay_places(site, a), lay_places(site, b))
+
+
+def spread(meeting: Meeting, count: int) -> Sequence[int]:
+    """Numbers of places that lie all over the drive."""
+    last = len(meeting.places_a) - 1
+    return [int(i) for i in np.linspace(0, last, count)]
+
+
+def test_three_that_agree_join_two_robots_where_they_are(meeting: Meeting) -> None:
+    made = [meeting.candidate(i) for i in spread(meeting, 3)]
+    merged = meeting.join()
+    assert merged is not None
+    assert (merged.survivor, merged.absorbed) == ("c0", "c1")
+    assert sorted(merged.constraints) == sorted(c.id for c in made)
+    assert meeting.site.merged_into == {"c1": "c0"}
+    assert meeting.worst_error() < 0.01
+    for name in merged.constraints:
+        stored = meeting.site.constraints[name]
+        assert (stored.state, stored.consistency_set) == ("accepted", merged.constraints)
+        assert stored.checks["map_conflict"] < 0.01
+
+
+def test_small_disagreement_is_averaged_not_refused(meeting: Meeting) -> None:
+    rng = np.random.default_rng(5)
+    for i in spread(meeting, 4):
+        meeting.candidate(i, Pose(*rng.normal(0.0, [0.03, 0.03, 0.005])))
+    assert meeting.join() is not None
+    assert meeting.worst_error() < 0.12
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_fewer_than_three_join_nothing(meeting: Meeting, count: int) -> None:
+    for i in list(spread(meeting, 3))[:count]:
+        meeting.candidate(i)
+    assert meeting.join() is None
+    assert not meeting.site.same_component(meeting.a[0], meeting.b[0])
+    assert all(c.state == "candidate" for c in meeting.site.constraints.values() if c.evidence > 99)
+
+
+def test_three_on_one_place_are_one_witness(meeting: Meeting) -> None:
+    first = meeting.candidate(0)
+    for _ in range(3):
+        again = replace(first, id=meeting.site.new_constraint_id())
+        meeting.site.add_constraint(again)
+    assert meeting.join() is None
+
+
+def test_three_that_contradict_each_other_join_nothing(meeting: Meeting) -> None:
+    for i, off in zip(
+        spread(meeting, 3), (Pose(0, 0, 0), Pose(2, 0, 0), Pose(0, 0, 1)), strict=True
+    ):
+        meeting.candidate(i, off)
+    assert meeting.join() is None
+
+
+def test_little_evidence_joins_nothing(meeting: Meeting) -> None:
+    for i in spread(meeting, 3):
+        meeting.candidate(i, evidence=10.0)
+    assert meeting.join() is None
+
+
+def shifted(meeting: Meeting, i: int, T: Pose, evidence: float) -> Constraint:
+    """A candidate of a rival story: the whole second map moved by T in the first one's frame."""
+    a, b = meeting.places_a[i], meeting.places_b[i]
+    T_a_b = meeting.true(a.anchor).between(T @ meeting.true(b.anchor))
+    return link(meeting.site, a.anchor, b.anchor, T_a_b, places=(a.id, b.id), evidence=evidence)
+
+
+def test_a_rival_story_with_as_much_evidence_blocks(meeting: Meeting) -> None:
+    for i in spread(meeting, 3):
+        meeting.candidate(i)
+        shifted(meeting, i, Pose(0.0, 3.0, 0.0), STRONG)
+    assert meeting.join() is None
+
+
+def test_a_weak_rival_does_not_block_and_is_rejected(meeting: Meeting) -> None:
+    right = [meeting.candidate(i) for i in spread(meeting, 4)]
+    wrong = shifted(meeting, 1, Pose(0.0, 3.0, 0.0), 30.0)
+    merged = meeting.join()
+    assert merged is not None
+    assert set(merged.constraints) == {c.id for c in right}
+    assert meeting.site.constraints[wrong.id].state == "rejected"
+    assert wrong.id not in meeting.site.graph.edges
+    assert meeting.worst_error() < 0.01
+
+
+@pytest.mark.parametrize("T", [Pose(1.5, 0, 0), Pose(0, -2.0, 0), Pose(12.0, 5.0, 3.14)])
+def test_a_story_that_puts_walls_into_free_space_is_refused(meeting: Meeting, T: Pose) -> None:
+    # All agree, all claim plenty: only the two maps themselves can object.
+    for i in spread(meeting, 4):
+        shifted(meeting, i, T, STRONG)
+    assert meeting.join() is None
+    assert not meeting.site.same_component(meeting.a[0], meeting.b[0])
+
+
+def test_places_that_look_like_others_nearby_prove_nothing(meeting: Meeting) -> None:
+    for i in spread(meeting, 4):
+        meeting.candidate(i)
+    for a in meeting.places_a[:2]:  # as if each looked just like every other one of its robot
+        for other in meeting.places_a:
+            meeting.site.alias[min(a.id, other.id), max(a.id, other.id)] = STRONG
+    for place in meeting.places_a[2:]:
+        meeting.site.alias[meeting.places_a[0].id, place.id] = STRONG
+        meeting.site.alias[place.id, place.id] = STRONG
+    assert meeting.join() is None
+
+
+def test_a_candidate_says_the_same_from_either_end(
+    drives: tuple[list[SimulatedScan], list[SimulatedScan]],
+) -> None:
+    poses = []
+    for turned in ((False, False, False), (True, True, True), (True, False, True)):
+        site = SiteMap(MapperConfig())
+        a = lay_track(site, drives[0], robot="a")
+        b = lay_track(site, drives[1], robot="b", begin=BEGIN_B)
+        made = Meeting(site, a, b, lay_places(site, a), lay_places(site, b))
+        offs = (Pose(0.02, 0.01, 0.004), Pose(-0.03, 0.0, 0.0), Pose(0.0, 0.02, -0.003))
+        for i, off, way in zip(spread(made, 3), offs, turned, strict=True):
+            made.candidate(i, off, turned=way)
+        assert made.join() is not None
+        poses.append(np.array([site.pose(k).to_array() for k in a + b]))
+    # Not exactly: the information was given in the axes of one end, isotropic but for the lever.
+    np.testing.assert_allclose(poses[1], poses[0], atol=5e-3)
+    np.testing.assert_allclose(poses[2], poses[0], atol=5e-3)
+
+
+def test_turning_a_candidate_round_keeps_its_cost(meeting: Meeting) -> None:
+    """What it charges for a small error must not depend on which end it is written from."""
+    rng = np.random.default_rng(2)
+    A = rng.normal(size=(3, 3))
+    given = link(
+        meeting.site,
+        meeting.b[4],
+        meeting.a[9],
+        meeting.true(meeting.b[4]).between(meeting.true(meeting.a[9])),
+        places=(meeting.places_b[0].id, meeting.places_a[1].id),
+        information=1e4 * (A @ A.T + np.eye(3)),
+        evidence=STRONG,
+    )
+    for i in spread(meeting, 3):
+        meeting.candidate(i)
+    assert meeting.join() is not None
+    stored = meeting.site.constraints[given.id]
+    assert (stored.keyframe_a, stored.keyframe_b) == (meeting.a[9], meeting.b[4])
+    for _ in range(10):
+        step = Pose.from_array(rng.normal(0.0, 1e-3, 3))
+        poses = {meeting.b[4]: Pose(0, 0, 0), meeting.a[9]: given.T_a_b @ step}
+        before, after = chi_squared([given.edge()], poses), chi_squared([stored.edge()], poses)
+        assert after[0] == pytest.approx(before[0], rel=0.02)
