@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import csv
-import json
 from collections.abc import Awaitable, Callable
 from typing import Any
 
@@ -13,7 +12,6 @@ import networkx as nx
 import numpy as np
 import pytest
 import pytest_asyncio
-from lineloom import wire
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 
@@ -260,138 +258,6 @@ async def test_constraint_filters_that_are_none(
 )
 async def test_what_is_not_there(client: httpx.AsyncClient, path: str, slug: str) -> None:
     await _refused(client, path, 404, slug)
-
-
-async def test_a_mount_is_set_shown_and_removed(
-    client: httpx.AsyncClient, make_scan: Make, idle: Idle
-) -> None:
-    url = "/v1/sites/mounts/robots/m"
-    mount = {"x": 0.2, "y": 0.0, "theta": 3.14, "inverted": True}
-    response = await client.put(url, json={"mount": mount})
-    assert response.status_code == 200
-    assert response.json()["mount"] == mount
-    assert response.json()["state"] == "starting"
-    assert (await idle("mounts"))["version"] == 1
-    await client.put(url, json={"mount": mount})
-    await client.post(f"{url}/scans", json=make_scan(0))
-    assert (await idle("mounts"))["version"] == 2
-    assert (await client.put(url, json={})).json()["mount"] is None
-    assert (await idle("mounts"))["version"] == 3
-
-
-@pytest.mark.parametrize(
-    ("body", "pointer"),
-    [
-        ({"mount": {"x": "1"}}, "/mount/x"),
-        ({"mount": {"inverted": 1}}, "/mount/inverted"),
-        ({"mount": {"z": 1.0}}, "/mount/z"),
-        ({"mout": {}}, "/mout"),
-        ([], ""),
-    ],
-)
-async def test_settings_that_are_none(client: httpx.AsyncClient, body: Any, pointer: str) -> None:
-    response = await client.put("/v1/sites/mounts/robots/n", json=body)
-    assert response.status_code == 422
-    assert pointer in [error["pointer"] for error in response.json()["errors"]]
-
-
-async def test_a_robot_is_forgotten(client: httpx.AsyncClient, make_scan: Make, idle: Idle) -> None:
-    for robot in ("r1", "r2"):
-        await client.post(f"/v1/sites/forget/robots/{robot}/scans", json=make_scan(0))
-    await idle("forget")
-    url = "/v1/sites/forget/robots/r1"
-    assert (await client.delete(url)).status_code == 204
-    await _refused(client, url, 404, "unknown-robot")
-    assert (await client.delete(url)).status_code == 404
-    site = await idle("forget")
-    assert site["robots"] == ["r2"]
-    assert site["components"] == [{"id": "c1", "robots": ["r2"], "keyframes": 1}]
-    again = await client.post(f"{url}/scans", json=make_scan(0))
-    assert again.json()["accepted"] == 1
-    await idle("forget")
-    assert (await client.get(url)).json()["scans"]["processed"] == 1
-
-
-async def test_a_site_is_deleted_and_starts_anew(
-    client: httpx.AsyncClient, make_scan: Make, idle: Idle
-) -> None:
-    url = "/v1/sites/gone"
-    await client.post(f"{url}/robots/r/scans", json={"scans": [make_scan(s) for s in range(3)]})
-    await idle("gone")
-    etag = (await client.get(f"{url}/map")).headers["etag"]
-    assert (await client.delete(url)).status_code == 204
-    await _refused(client, url, 404, "unknown-site")
-    await _refused(client, f"{url}/map", 404, "unknown-site")
-    assert (await client.delete(url)).status_code == 404
-    await client.post(f"{url}/robots/r/scans", json={"scans": [make_scan(s) for s in range(3)]})
-    assert (await idle("gone"))["version"] == 3
-    response = await client.get(f"{url}/map", headers={"If-None-Match": etag})
-    assert response.status_code == 200
-
-
-async def test_a_skipped_scan_is_told(
-    client: httpx.AsyncClient, make_scan: Make, idle: Idle
-) -> None:
-    body = {"scans": [make_scan(0), make_scan(1, stamp=666.0), make_scan(2)]}
-    await client.post("/v1/sites/skips/robots/r/scans", json=body)
-    site = await idle("skips")
-    assert site["scans"] == {"accepted": 3, "processed": 2, "pending": 0, "skipped": 1}
-    robot = (await client.get("/v1/sites/skips/robots/r")).json()
-    assert robot["scans"] == site["scans"]
-    assert robot["health"] == [
-        "scan 1 of session '0' was left out of the map: ValueError: this scan is cursed"
-    ]
-
-
-async def test_match(client: httpx.AsyncClient) -> None:
-    angles = np.linspace(-np.pi / 2, np.pi / 2, 181)
-
-    def seen_from(x: float, y: float) -> dict[str, Any]:
-        """A room of 8 m by 6 m with its centre in the origin, and a step in one wall."""
-        c, s = np.cos(angles), np.sin(angles)
-        with np.errstate(divide="ignore"):
-            across = np.where(c >= 0, (4.0 - x) / np.abs(c), (4.0 + x) / np.abs(c))
-            along = np.where(s >= 0, (3.0 - y) / np.abs(s), (2.0 + y) / np.abs(s))
-        return {
-            "angle_min": float(angles[0]),
-            "angle_increment": float(angles[1] - angles[0]),
-            "range_min": 0.05,
-            "range_max": 30.0,
-            "ranges": np.minimum(across, along).tolist(),
-        }
-
-    body = {"reference": seen_from(0.0, 0.0), "current": seen_from(0.5, 0.2)}
-    response = await client.post("/v1/match", json=body)
-    assert response.status_code == 200
-    answer = wire.MatchAnswer.model_validate_json(response.content)
-    assert answer.verdict in ("match", "ambiguous")
-    assert answer.T_reference_current is not None
-    assert answer.T_reference_current.x == pytest.approx(0.5, abs=0.05)
-    assert answer.T_reference_current.y == pytest.approx(0.2, abs=0.05)
-    assert answer.pairs
-    assert 0.0 <= answer.score <= 1.0
-
-
-async def test_match_of_nothing(client: httpx.AsyncClient, make_scan: Make) -> None:
-    empty = make_scan(0, ranges=["inf"] * 5)
-    response = await client.post("/v1/match", json={"reference": empty, "current": empty})
-    assert response.json()["verdict"] == "none"
-    assert response.json()["reason"]
-    for body, pointer in (
-        ({"reference": empty}, "/current"),
-        ({"reference": empty, "current": make_scan(0, ranges=[])}, "/current/ranges"),
-        ({"reference": make_scan(0, range_max=0.01), "current": empty}, "/reference/range_max"),
-        (
-            {"reference": make_scan(0, angle_min=float("nan")), "current": empty},
-            "/reference/angle_min",
-        ),
-        ([], ""),
-    ):
-        content = json.dumps(body).encode()
-        headers = {"Content-Type": "application/json"}
-        response = await client.post("/v1/match", content=content, headers=headers)
-        assert response.status_code == 422, body
-        assert pointer in [error["pointer"] for error in response.json()["errors"]]
 
 
 async def test_alive_and_ready(client: httpx.AsyncClient) -> None:
