@@ -12,9 +12,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-FEATURES = ("evidence", "conflict", "matched_share", "margin", "information", "overlap")
-WEIGHTS = (4.564, -1.545, -0.438, 0.556, 0.404, -2.282)
-BIAS = -6.372
+FEATURES = ("evidence", "conflict", "matched_share", "margin", "information", "overlap", "weak")
+WEIGHTS = (2.61, -1.665, -0.078, 0.831, 0.444, -0.628, -0.918)
+BIAS = -5.453
 
 
 def descriptors(checks: Mapping[str, float]) -> NDArray[np.float64]:
@@ -27,6 +27,7 @@ def descriptors(checks: Mapping[str, float]) -> NDArray[np.float64]:
             min(max(checks["margin"], 0.0), 1.0) * 3.0,
             math.log10(max(checks["information"], 1.0)),
             math.log1p(checks["overlap_m"]),
+            1.0 if checks["information"] < 300.0 else 0.0,
         ]
     )
 
