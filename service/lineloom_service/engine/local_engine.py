@@ -86,8 +86,7 @@ class LocalEngine:
     @property
     def pids(self) -> list[int]:
         """Process ids of the workers that run."""
-        running = [slot.process for slot in self._slots if slot.process is not None]
-        return [process.pid for process in running if process.pid is not None]
+        return [slot.process.pid for slot in self._slots if slot.process is not None]
 
     async def start(self) -> None:
         """Spawn the workers."""

@@ -9,12 +9,10 @@ import signal
 import threading
 import time
 import zlib
-from collections.abc import MutableSequence
 from dataclasses import dataclass
-from multiprocessing import parent_process
-from multiprocessing.connection import Connection, wait
-from typing import Any
+from multiprocessing.connection import Connection
 
+from lineloom_service.engine.current_entry import RESTORING, CurrentEntry
 from lineloom_service.engine.mapper import Mapper, MapperFactory, apply, load
 from lineloom_service.engine.messages import (
     Failed,
@@ -32,9 +30,6 @@ from lineloom_service.engine.messages import (
 )
 
 _LOG = logging.getLogger(__name__)
-
-RESTORING = -1
-"""Stands for a position while a snapshot is restored."""
 
 _NICENESS = 5
 _CAUGHT_UP_PAUSE_S = 0.05
@@ -57,14 +52,13 @@ class _Hosted:
 class Worker:
     """Serves orders until the pipe closes.
 
-    current: shared with the service: site and position being worked on, so that it knows whom to
-    blame if this process dies.
+    current: shared with the service, so that it knows whom to blame if this process dies.
     """
 
     def __init__(
         self,
         connection: Connection[Report, Order],
-        current: MutableSequence[int],
+        current: CurrentEntry,
         factory: MapperFactory,
         publish_every_s: float,
     ) -> None:
@@ -102,7 +96,7 @@ class Worker:
 
     def _start(self, order: StartSite) -> None:
         self._sites.pop(order.site, None)
-        self._mark(order.site, RESTORING)
+        self._current.mark(order.site, RESTORING)
         try:
             if order.snapshot is None:
                 mapper = self._factory()
@@ -112,7 +106,7 @@ class Worker:
             self._connection.send(Started(order.site, order.run, describe(error)))
             return
         finally:
-            self._mark(0, 0)
+            self._current.clear()
         now = time.monotonic()
         self._sites[order.site] = _Hosted(order.run, mapper, order.position, due=now)
         self._connection.send(Started(order.site, order.run))
@@ -122,7 +116,7 @@ class Worker:
         if hosted is None:
             return
         for entry in order.entries:
-            self._mark(order.site, entry.position)
+            self._current.mark(order.site, entry.position)
             try:
                 apply(hosted.mapper, entry)
             except Exception as error:
@@ -132,7 +126,7 @@ class Worker:
                 self._connection.send(Failed(order.site, order.run, entry.position, reason))
                 return
             finally:
-                self._mark(0, 0)
+                self._current.clear()
         hosted.position = order.through
         pause = _CAUGHT_UP_PAUSE_S if order.caught_up else self._publish_every_s
         hosted.due = hosted.earliest + max(pause, hosted.pause)
@@ -176,10 +170,6 @@ class Worker:
         hosted.earliest = time.monotonic()
         hosted.pause = (hosted.earliest - started) / _PUBLISHING_SHARE
 
-    def _mark(self, site: int, position: int) -> None:
-        self._current[0] = site
-        self._current[1] = position
-
 
 def describe(error: BaseException) -> str:
     """Return an exception as one short line."""
@@ -188,28 +178,27 @@ def describe(error: BaseException) -> str:
 
 
 def run_worker(
-    connection: Connection[Report, Order],
-    current: Any,
-    mapper: str,
-    warm_up: str | None,
-    publish_every_s: float,
+    mapper: str, warm_up: str | None, publish_every_s: float, *, pipe: int, life: int, current: int
 ) -> None:
-    """Be a worker process. Ends with the service, however that ends."""
+    """Be a worker process. Ends with the service, however that ends.
+
+    pipe, life, current: file descriptors of the pipe to the service, of one that the service
+    holds open as long as it lives, and of the shared CurrentEntry.
+    """
     # A Ctrl-C goes to the whole terminal group; the service decides when its workers end.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=_end_with_service, args=(life,), daemon=True).start()
     with contextlib.suppress(OSError):
         os.nice(_NICENESS)  # answers go before mapping
     factory = load(mapper)
     if warm_up is not None:
         load(warm_up)()
+    connection: Connection[Report, Order] = Connection(pipe)
     # The service has closed its end: nobody is left to report to.
     with contextlib.suppress(BrokenPipeError, ConnectionResetError):
-        Worker(connection, current, factory, publish_every_s).serve()
+        Worker(connection, CurrentEntry(current), factory, publish_every_s).serve()
 
 
-def _end_with_parent() -> None:
-    parent = parent_process()
-    if parent is not None:
-        wait([parent.sentinel])
-        os._exit(0)
+def _end_with_service(life: int) -> None:
+    os.read(life, 1)  # nothing is ever written: this returns when the other end closes
+    os._exit(0)

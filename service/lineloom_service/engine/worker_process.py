@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import multiprocessing
+import os
 import queue
 import signal
+import subprocess
+import sys
 import threading
 from collections.abc import Callable
-from multiprocessing.connection import Connection
+from multiprocessing.connection import Connection, Pipe
 
+from lineloom_service.engine.current_entry import CurrentEntry
 from lineloom_service.engine.messages import Order, Ready, Report
-from lineloom_service.engine.worker import run_worker
-
-_SPAWN = multiprocessing.get_context("spawn")
 
 
 class WorkerProcess:
     """One life of one worker. Callbacks come on the event loop; `on_death` comes last, once.
 
-    Threads, because a full pipe must not stop the event loop, and unpickling a large map neither.
+    A program of its own and not `multiprocessing`'s: that would run the main script again in the
+    child, which starts another service where the script has no guard. Threads, because a full
+    pipe must not stop the event loop, and unpickling a large map neither.
     """
 
     def __init__(
@@ -37,41 +39,48 @@ class WorkerProcess:
         self._on_report = on_report
         self._on_death = on_death
         self._loop = asyncio.get_running_loop()
-        self._current = _SPAWN.Array("q", 2, lock=False)
-        ours, theirs = _SPAWN.Pipe()
+        self._current = CurrentEntry.create()
+        self._blamed: tuple[int, int] | None = None
+        ours, theirs = Pipe()
         self._connection: Connection[Order, Report] = ours
-        self._process = _SPAWN.Process(
-            target=run_worker,
-            args=(theirs, self._current, mapper, warm_up, publish_every_s),
-            name=name,
-            daemon=True,
+        life, self._life = os.pipe()
+        descriptors = (theirs.fileno(), life, self._current.fd)
+        arguments = (mapper, warm_up or "", publish_every_s, *descriptors)
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "lineloom_service.engine", *map(str, arguments)],
+            stdin=subprocess.DEVNULL,
+            pass_fds=descriptors,
+            # The same modules as here, wherever they were found.
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
         )
-        self._process.start()
         theirs.close()  # so that the pipe breaks when the child ends
+        os.close(life)
         self._orders: queue.SimpleQueue[Order | None] = queue.SimpleQueue()
-        for target in (self._send_orders, self._receive_reports):
-            threading.Thread(target=target, name=f"{name}-{target.__name__}", daemon=True).start()
+        self._sender = threading.Thread(
+            target=self._send_orders, name=f"{name}-sender", daemon=True
+        )
+        self._sender.start()
+        threading.Thread(target=self._receive_reports, name=f"{name}-receiver", daemon=True).start()
 
     @property
-    def pid(self) -> int | None:
+    def pid(self) -> int:
         """The child's process id."""
         return self._process.pid
 
     @property
     def blamed(self) -> tuple[int, int] | None:
-        """Site and position that the child was (last) working on, None where on nothing."""
-        site, position = self._current[0], self._current[1]
-        return (site, position) if position else None
+        """Site and position that the child was working on when it died, None where on nothing."""
+        return self._blamed
 
     @property
     def killed(self) -> bool:
         """Whether SIGKILL ended the child."""
-        return self._process.exitcode == -signal.SIGKILL
+        return self._process.returncode == -signal.SIGKILL
 
     @property
     def last_words(self) -> str:
         """How the child ended."""
-        code = self._process.exitcode
+        code = self._process.returncode
         if code is not None and code < 0:
             return f"the worker was ended by {signal.Signals(-code).name}"
         return f"the worker ended with code {code}"
@@ -96,7 +105,12 @@ class WorkerProcess:
                 report = self._connection.recv()
                 self._tell(self._take, report)
         self._orders.put(None)
-        self._process.join()
+        self._process.wait()
+        self._sender.join()  # before its pipe's number can be another's
+        self._blamed = self._current.read()
+        self._current.close()
+        self._connection.close()
+        os.close(self._life)
         self._tell(self._on_death)
 
     def _take(self, report: Report) -> None:

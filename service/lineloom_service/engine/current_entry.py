@@ -1,0 +1,47 @@
+"""What a worker is working on, in memory that outlives it: whom to blame when it dies."""
+
+from __future__ import annotations
+
+import mmap
+import os
+import struct
+import tempfile
+
+RESTORING = -1
+"""Stands for a position while a snapshot is restored."""
+
+_LAYOUT = struct.Struct("=qq")
+_NOTHING = (0, 0)
+
+
+class CurrentEntry:
+    """Site id and position, shared by two processes through a file that has no name."""
+
+    def __init__(self, fd: int) -> None:
+        self.fd = fd
+        self._memory = mmap.mmap(fd, _LAYOUT.size)
+
+    @classmethod
+    def create(cls) -> CurrentEntry:
+        """Make a new one; the file goes with the last process that has it open."""
+        with tempfile.TemporaryFile() as file:
+            file.truncate(_LAYOUT.size)
+            return cls(os.dup(file.fileno()))
+
+    def mark(self, site: int, position: int) -> None:
+        """Say what is being worked on now."""
+        _LAYOUT.pack_into(self._memory, 0, site, position)
+
+    def clear(self) -> None:
+        """Say that nothing is."""
+        _LAYOUT.pack_into(self._memory, 0, *_NOTHING)
+
+    def read(self) -> tuple[int, int] | None:
+        """Return site and position, None where nothing is being worked on."""
+        site, position = _LAYOUT.unpack_from(self._memory, 0)
+        return None if (site, position) == _NOTHING else (site, position)
+
+    def close(self) -> None:
+        """Let go of the memory."""
+        self._memory.close()
+        os.close(self.fd)
