@@ -38,17 +38,17 @@ class PrimitiveConfig:
 class Windows:
     """The bounding error windows within which two parameters are equal (§4.4, §6.3.1).
 
-    angle [rad] and distance [m] are the text's 5 degrees and 10 cm. length: the same for
-    complete line segments [m]. least_edge_distance: edges closer than this have no direction
-    from one to the other [m]. corners_bind_lines: lines that end in corners that differ cannot
-    match (§4.1.2).
+    angle [rad] and distance [m] are the text's 5 degrees and 10 cm. length: for complete line
+    segments [m], more because either end may be a beam's spacing off. least_edge_distance: edges
+    closer than this have no direction from one to the other [m]. corners_bind_lines: lines that
+    end in corners that differ cannot match (§4.1.2).
     """
 
     angle: float = math.radians(5.0)
     distance: float = 0.10
-    length: float = 0.10
+    length: float = 0.15
     least_edge_distance: float = 0.3
-    corners_bind_lines: bool = True
+    corners_bind_lines: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,22 +58,26 @@ class ThesisConfig:
     lines: "chapter 3", or "features" for the extraction of the default matcher, to compare.
     threshold: Algorithm 5's least merged score. both_orders: compare a relation (k, m) with
     (u, v) and (v, u); False as printed, where extraction numbers always ascend. order_extension:
-    §5.7, Algorithm 10 instead of 7. rivals: how many further first maxima are followed, to learn
+    §5.7, Algorithm 10 instead of 7. discard: drop pairs that contradict the others after the
+    alignment (see `alignment`). rivals: how many further first maxima are followed, to learn
     whether the answer is unique; backtrack: prefer a rival whose score is greater (the text never
     does). least_margin: lead over the rivals that an unambiguous answer has. most_spread: how far
     the translations of single edges may lie from their mean, rms [m]. least_pairs, least_score:
-    what a "match" must have.
+    what a "match" must have; least_share: share of the scores that a "weak" answer of fewer
+    pairs must have.
     """
 
     primitives: PrimitiveConfig = field(default_factory=PrimitiveConfig)
     windows: Windows = field(default_factory=Windows)
     lines: Literal["chapter 3", "features"] = "chapter 3"
     threshold: float = 0.5
-    both_orders: bool = True
+    both_orders: bool = False
     order_extension: bool = False
     rivals: int = 2
     backtrack: bool = False
+    discard: bool = True
     least_margin: float = 0.15
     most_spread: float = 0.3
     least_pairs: int = 3
-    least_score: float = 0.1
+    least_score: float = 0.5
+    least_share: float = 0.4

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lineloom_core.features import extract_features
-from lineloom_core.geometry import Pose, angle_difference
+from lineloom_core.geometry import angle_difference
 from lineloom_core.matching.result import Alternative, LinePair, MatchResult, Verdict
+from lineloom_core.matching.thesis.alignment import Alignment, align
 from lineloom_core.matching.thesis.config import ThesisConfig
 from lineloom_core.matching.thesis.consistency import consistency_tables
 from lineloom_core.matching.thesis.distinguishability import count, matching_relations
@@ -22,8 +23,7 @@ from lineloom_core.matching.thesis.primitives import (
     primitives_of_features,
 )
 from lineloom_core.matching.thesis.relations import RelationSet, extract_relations
-from lineloom_core.matching.thesis.rotation import rotational_difference
-from lineloom_core.matching.thesis.translation import Translation, translational_difference
+from lineloom_core.matching.thesis.score import agreement_score
 from lineloom_core.scan import Scan
 
 RIVAL_DISTANCE, RIVAL_ANGLE = 0.3, 0.15
@@ -49,8 +49,13 @@ class Hypothesis:
     """One run of Algorithm 5 and the pose difference it leads to."""
 
     found: MatchingPairs
-    T_reference_current: Pose
-    translation: Translation
+    alignment: Alignment
+
+    @property
+    def total(self) -> float:
+        """Sum of the merged scores of the pairs that agree with the alignment."""
+        scores = dict(zip(self.found.pairs, self.found.scores, strict=True))
+        return math.fsum(scores[pair] for pair in self.alignment.pairs)
 
 
 class ThesisMatcher:
@@ -115,26 +120,22 @@ class ThesisMatcher:
                 break
             found = find_matching_line_segments(table, r, c, self.config, first=(k, m))
             matched += found.pairs
-            hypotheses.append(self._hypothesis(found, r, c))
+            hypotheses.append(Hypothesis(found, align(found.pairs, r.L, c.L, self.config)))  # §5.6
         if self.config.backtrack:
-            hypotheses.sort(key=lambda h: -h.found.total)
+            hypotheses.sort(key=lambda h: -h.total)
         return hypotheses
-
-    def _hypothesis(self, found: MatchingPairs, r: Primitives, c: Primitives) -> Hypothesis:
-        theta = rotational_difference(found.pairs, r.L, c.L)  # §5.6.1
-        t = translational_difference(found.pairs, r.L, c.L, theta, self.config)  # §5.6.2
-        return Hypothesis(found, Pose(t.x, t.y, theta), t)
 
     def _answer(
         self, hypotheses: list[Hypothesis], reference: Description, current: Description
     ) -> MatchResult:
         best, *others = hypotheses
         rivals = [h for h in others if _is_elsewhere(h, best)]
-        lead = 1.0 - max((h.found.total for h in rivals), default=0.0) / best.found.total
-        score = best.found.total / greatest_total(current)
-        verdict, reason = self._verdict(best, lead, score)
-        pose = best.T_reference_current
-        undetermined = best.translation.undetermined
+        lead = 1.0 - max((h.total for h in rivals), default=0.0) / best.total
+        score = agreement_score(best.total, best.alignment.translation.edges)
+        share = best.total / greatest_total(current)
+        verdict, reason = self._verdict(best, lead, score, share)
+        pose = best.alignment.T_reference_current
+        undetermined = best.alignment.translation.undetermined
         return MatchResult(
             verdict=verdict,
             T_reference_current=None if verdict == "none" else pose,
@@ -144,41 +145,56 @@ class ThesisMatcher:
             reason=reason,
             pairs=_line_pairs(best, reference.primitives, current.primitives),
             checks={
-                "pairs": float(len(best.found.pairs)),
-                "total": best.found.total,
-                "edges": float(best.translation.edges),
-                "spread": best.translation.spread,
+                "pairs": float(len(best.alignment.pairs)),
+                "total": best.total,
+                "share": share,
+                "edges": float(best.alignment.translation.edges),
+                "discarded": float(len(best.alignment.discarded)),
+                "spread": best.alignment.translation.spread,
                 "lead": lead,
             },
             alternatives=tuple(
-                Alternative(h.T_reference_current, score * h.found.total / best.found.total)
+                Alternative(h.alignment.T_reference_current, score * h.total / best.total)
                 for h in rivals
             ),
             best=pose,
         )
 
-    def _verdict(self, best: Hypothesis, lead: float, score: float) -> tuple[Verdict, str]:
+    def _verdict(
+        self, best: Hypothesis, lead: float, score: float, share: float
+    ) -> tuple[Verdict, str]:
         config = self.config
-        count_of_pairs = len(best.found.pairs)
+        count_of_pairs = len(best.alignment.pairs)
         if count_of_pairs < 2:
             return "none", "a single pair of line segments is no evidence"
-        if best.translation.spread > config.most_spread:
-            spread = best.translation.spread
+        if best.alignment.translation.spread > config.most_spread:
+            spread = best.alignment.translation.spread
             return "none", f"the common edges contradict one another by {spread:.2f} m"
+        if best.alignment.translation.undetermined is not None:
+            return self._verdict_of_parallels(count_of_pairs, lead, share)
+        if count_of_pairs < config.least_pairs or score < config.least_score:
+            return "none", f"{count_of_pairs} pairs agree: right with a probability of {score:.2f}"
         if lead < config.least_margin:
             return "ambiguous", "another first maximum leads to an answer as good"
-        if best.translation.undetermined is not None:
-            return "weak", "all matching line segments are parallel: they may slide along"
-        if count_of_pairs < config.least_pairs or score < config.least_score:
-            return "none", f"only {count_of_pairs} pairs with {100 * score:.0f} % of the scores"
         return "match", "the matching line segments agree"
+
+    def _verdict_of_parallels(
+        self, count_of_pairs: int, lead: float, share: float
+    ) -> tuple[Verdict, str]:
+        """Parallel lines alone are common: there must be several, or little else in the scan."""
+        config = self.config
+        if count_of_pairs < config.least_pairs and share < config.least_share:
+            return "none", f"only {count_of_pairs} parallel pairs agree, {100 * share:.0f} % of all"
+        if lead < config.least_margin:
+            return "ambiguous", "another first maximum leads to an answer as good"
+        return "weak", "all matching line segments are parallel: they may slide along"
 
 
 def greatest_total(current: Description) -> float:
     """Sum of merged scores if every relation of S_c were found once in S_r.
 
-    A score of 1 / Count(g_c, G_c) for each line of each relation: what the score of a match is
-    normalised by.
+    A score of 1 / Count(g_c, G_c) for each line of each relation: what the "share" among the
+    checks is the share of.
     """
     kinds = zip(current.G.kinds, current.counts, strict=True)
     return math.fsum(
@@ -188,19 +204,19 @@ def greatest_total(current: Description) -> float:
 
 
 def _is_elsewhere(hypothesis: Hypothesis, best: Hypothesis) -> bool:
-    a, b = hypothesis.T_reference_current, best.T_reference_current
+    a, b = hypothesis.alignment.T_reference_current, best.alignment.T_reference_current
     dx, dy = a.x - b.x, a.y - b.y
     apart = math.hypot(dx, dy)
-    if (along := best.translation.undetermined) is not None:
+    if (along := best.alignment.translation.undetermined) is not None:
         apart = abs(dy * math.cos(along) - dx * math.sin(along))
     return apart > RIVAL_DISTANCE or abs(angle_difference(a.theta, b.theta)) > RIVAL_ANGLE
 
 
 def _line_pairs(best: Hypothesis, r: Primitives, c: Primitives) -> tuple[LinePair, ...]:
     """The matching pairs with how well they lie on each other."""
-    moved = c.L.moved(best.T_reference_current)
+    moved = c.L.moved(best.alignment.T_reference_current)
     pairs = []
-    for k, m in best.found.pairs:
+    for k, m in best.alignment.pairs:
         u = np.array([math.cos(r.L.directions[k]), math.sin(r.L.directions[k])])
         n = np.array([-u[1], u[0]])
         s_k, e_k = float(u @ r.L.s[k]), float(u @ r.L.e[k])
