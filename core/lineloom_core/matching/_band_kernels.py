@@ -8,17 +8,15 @@ import numpy as np
 from numba import njit
 
 from lineloom_core.features._kernels import LENGTH, THETA, X1, X2, Y1, Y2
-from lineloom_core.matching._kernels import (
-    CONFLICT,
+from lineloom_core.matching._free_space_kernels import CONFLICT, MATCHED, judge_pair
+from lineloom_core.matching._kernels import evidence
+from lineloom_core.matching._proposal_kernels import (
     LONG_ENOUGH,
-    MATCHED,
     compatible_pairs,
-    evidence,
-    judge_pair,
-    refine,
     rotation_peaks,
     wrap_angle,
 )
+from lineloom_core.matching._refinement_kernels import refine
 
 COARSE_STEP = 6
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from lineloom_core.features import ScanFeatures
 from lineloom_core.geometry import Pose
-from lineloom_core.matching import _kernels
+from lineloom_core.matching import _free_space_kernels as _kernels
 
 TOLERANCE = 0.11
 """Range tolerance [m] at zero range."""

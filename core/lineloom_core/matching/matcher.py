@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from lineloom_core.features import ExtractionConfig, ScanFeatures, extract_features
 from lineloom_core.geometry import Pose, angle_difference
-from lineloom_core.matching import _kernels
+from lineloom_core.matching import _kernels, _proposal_kernels
 from lineloom_core.matching.band import Band, as_band, band_hypotheses
 from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
 from lineloom_core.matching.result import Alternative, LinePair, MatchResult, Verdict
@@ -89,18 +89,38 @@ class LineMatcher:
             return _none("fewer than two line segments in a scan")
         table = self._hypotheses(reference, current)
         result = self._decide(reference, current, table)
-        if result.verdict in {"match", "weak"}:
+        if result.verdict != "none":
             return result
         bands = band_hypotheses(reference, current)
         if len(bands) == 0:
             return result
         result = self._decide(reference, current, _by_evidence(table, bands))
-        if result.verdict == "match":
+        if result.verdict in {"match", "ambiguous"}:
             return result
         band = next((b for b in map(as_band, bands) if b.convincing), None)
         if band is None:
             return _unsure(result)
+        if result.verdict == "ambiguous" and self._contradicts(result, band):
+            return result
         return _as_weak(result, band, line_pairs(reference, current, band.T_reference_current))
+
+    def _contradicts(self, result: MatchResult, band: Band) -> bool:
+        """A full pose that fits as well as any denies what the band claims to know.
+
+        As in a symmetric room: then more than parallel walls is shared, and it fits several ways.
+        """
+        if result.best is None or result.checks["information"] < self.config.weak_below:
+            return False
+        least = (1.0 - self.config.least_margin) * result.score
+        equals = [a.T_reference_current for a in result.alternatives if a.score > least]
+        c, s = math.cos(band.direction), math.sin(band.direction)
+        claimed = band.T_reference_current
+        for T in (result.best, *equals):
+            across = abs(c * (T.y - claimed.y) - s * (T.x - claimed.x))
+            turned = abs(angle_difference(T.theta, claimed.theta))
+            if across > self.config.rival_distance or turned > self.config.rival_angle:
+                return True
+        return False
 
     def _decide(
         self, reference: ScanFeatures, current: ScanFeatures, table: NDArray[np.float64]
@@ -213,7 +233,7 @@ def _as_weak(result: MatchResult, band: Band, pairs: tuple[LinePair, ...]) -> Ma
 
 def line_pairs(reference: ScanFeatures, current: ScanFeatures, pose: Pose) -> tuple[LinePair, ...]:
     """Line segments that lie on each other under `pose`, by extraction numbers."""
-    rows = _kernels.lying_pairs(
+    rows = _proposal_kernels.lying_pairs(
         reference.lines, current.lines, pose.to_array(), math.radians(5.0), 0.12, 0.1
     )
     return tuple(LinePair(int(i), int(j), o, d, a) for i, j, o, d, a in rows.tolist())

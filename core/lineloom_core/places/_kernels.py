@@ -7,15 +7,14 @@ import math
 import numpy as np
 from numba import njit
 
-from lineloom_core.matching._kernels import (
+from lineloom_core.matching._free_space_kernels import (
     CONFLICT,
     MATCHED,
     invert_pose,
     judge_cloud,
-    propose,
-    refine,
-    wrap_angle,
 )
+from lineloom_core.matching._proposal_kernels import propose, wrap_angle
+from lineloom_core.matching._refinement_kernels import refine
 
 
 @njit(cache=True)

@@ -13,7 +13,7 @@ import numpy as np
 from lineloom_core.features import EDGE, ScanFeatures
 from lineloom_core.features._kernels import VAR_OFFSET, VAR_THETA
 from lineloom_core.geometry import Pose, wrap
-from lineloom_core.matching._kernels import CONFLICT, MATCHED, OCCLUDED, OUTSIDE
+from lineloom_core.matching._free_space_kernels import CONFLICT, MATCHED, OCCLUDED, OUTSIDE
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]

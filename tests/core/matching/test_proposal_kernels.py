@@ -10,7 +10,7 @@ from lineloom_core.features import ScanFeatures
 from lineloom_core.features._kernels import LENGTH
 from lineloom_core.geometry import Pose
 from lineloom_core.geometry.angles import wrap_array
-from lineloom_core.matching import _kernels as fast
+from lineloom_core.matching import _proposal_kernels as fast
 from numpy.typing import NDArray
 
 from tests.core.matching import slow_twins as slow

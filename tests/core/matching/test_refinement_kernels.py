@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from lineloom_core.features import ScanFeatures, extract_features
 from lineloom_core.geometry import Pose
-from lineloom_core.matching import _kernels as fast
+from lineloom_core.matching import _free_space_kernels as free
+from lineloom_core.matching import _refinement_kernels as fast
 from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE, judge_sweeps
 from lineloom_core.simulation import rectangle, scanner_360, sick_lms200
 from numpy.typing import NDArray
@@ -71,10 +72,10 @@ def test_refinement_is_gauss_newton_and_finds_the_truth(feature_pairs: list[Feat
 def test_a_bearing_is_an_arc_tangent_to_a_hundred_thousandth() -> None:
     angles = np.linspace(-math.pi, math.pi, 4001)
     for r in (1e-6, 1.0, 50.0):
-        found = [fast.bearing(r * math.sin(a), r * math.cos(a)) for a in angles]
+        found = [free.bearing(r * math.sin(a), r * math.cos(a)) for a in angles]
         expected = [math.atan2(r * math.sin(a), r * math.cos(a)) for a in angles]
         np.testing.assert_allclose(found, expected, atol=1.1e-5)
-    assert fast.bearing(0.0, 0.0) == 0.0
+    assert free.bearing(0.0, 0.0) == 0.0
 
 
 @pytest.mark.parametrize("angle_min", [-math.pi, -math.pi / 2, 0.0, 3.0, -9.0, 11.0])
@@ -85,7 +86,7 @@ def test_the_beam_that_looks_at_a_point(angle_min: float, increment: float) -> N
         for off in (-0.45, 0.0, 0.45):
             a = angle_min + (k + off) * increment
             x, y = 3.0 * math.cos(a), 3.0 * math.sin(a)
-            beam = fast.beam_of(x, y, angle_min, per_radian, math.tau * per_radian)
+            beam = free.beam_of(x, y, angle_min, per_radian, math.tau * per_radian)
             assert beam == slow.nearest_beam(np.array([x, y]), angle_min, increment)
             assert beam == k
 
@@ -106,7 +107,7 @@ def test_points_before_on_and_behind_a_sweep(beams: int, increment: float) -> No
     angles, r = rng.uniform(-math.pi, math.pi, 6000), rng.uniform(0.5, 7.0, 6000)
     verdicts = []
     for x, y in zip(r * np.cos(angles), r * np.sin(angles), strict=True):
-        found = fast.judge_point(
+        found = free.judge_point(
             x, y, ranges, angle_min, 1.0 / step, math.tau / step, TOLERANCE, TOLERANCE_SLOPE
         )
         point = np.array([x, y])
@@ -117,12 +118,12 @@ def test_points_before_on_and_behind_a_sweep(beams: int, increment: float) -> No
 
 def test_a_beam_without_return_is_never_free_space() -> None:
     point = (2.0, 0.0)
-    for r, verdict in ((8.0, fast.CONFLICT), (2.0, fast.MATCHED), (1.0, fast.OCCLUDED),
-                       (np.inf, fast.OUTSIDE), (np.nan, fast.OUTSIDE),
-                       (-np.inf, fast.OUTSIDE)):  # fmt: skip
+    for r, verdict in ((8.0, free.CONFLICT), (2.0, free.MATCHED), (1.0, free.OCCLUDED),
+                       (np.inf, free.OUTSIDE), (np.nan, free.OUTSIDE),
+                       (-np.inf, free.OUTSIDE)):  # fmt: skip
         ranges = np.full(181, r)
         args = (ranges, -math.pi / 2, 180 / math.pi, 360.0, 0.1, 0.01)
-        assert fast.judge_point(*point, *args) == verdict
+        assert free.judge_point(*point, *args) == verdict
 
 
 def test_free_space_one_way(feature_pairs: list[FeaturePair]) -> None:
@@ -131,7 +132,7 @@ def test_free_space_one_way(feature_pairs: list[FeaturePair]) -> None:
             counts = np.zeros(4)
             args = (TOLERANCE, TOLERANCE_SLOPE)
             spacing = cur.angle_increment
-            fast.judge_points(
+            free.judge_points(
                 cur.points, spacing, 3, pose.to_array(), *sweep_of(ref), *args, counts
             )
             expected = slow.judge_all(cur.points[::3], spacing, pose, sweep_of(ref), *args)
@@ -160,14 +161,14 @@ def test_metres_of_wall_are_those_of_the_lidar_that_measured_them() -> None:
     one_way = {}
     for name, points, sweep in (("dense", dense, sparse), ("sparse", sparse, dense)):
         counts = np.zeros(4)
-        fast.judge_points(
+        free.judge_points(
             points.points, points.angle_increment, 1, np.zeros(3), *sweep_of(sweep),
             TOLERANCE, TOLERANCE_SLOPE, counts,
         )  # fmt: skip
         r = np.hypot(*points.points.T)
         share = np.minimum(r * points.angle_increment, 0.05)
         assert counts.sum() == pytest.approx(share.sum())
-        one_way[name] = counts[fast.MATCHED]
+        one_way[name] = counts[free.MATCHED]
     both = judge_sweeps(sparse, dense, Pose.identity())
     assert both.matched == pytest.approx(one_way["dense"] + one_way["sparse"])
     assert both.conflict_share < 0.01
@@ -190,7 +191,7 @@ def test_a_point_is_matched_where_as_many_sweeps_measured_it_as_saw_through(
     ref, _, _ = feature_pairs[0]
     pose = Pose(0.4, 0.3, 0.2)
     counts, args = np.zeros(4), (TOLERANCE, TOLERANCE_SLOPE)
-    fast.judge_cloud(
+    free.judge_cloud(
         ref.points, 1, pose.to_array(), np.array([f.ranges for _, f in sweeps]),
         np.array([f.angle_min for _, f in sweeps]),
         np.array([f.angle_increment for _, f in sweeps]),
@@ -198,10 +199,10 @@ def test_a_point_is_matched_where_as_many_sweeps_measured_it_as_saw_through(
     )  # fmt: skip
     expected = slow.judge_cloud(ref.points, pose, [(T, sweep_of(f)) for T, f in sweeps], *args)
     np.testing.assert_allclose(counts, expected, atol=1)
-    assert np.all(expected[: fast.OCCLUDED] > 10)
+    assert np.all(expected[: free.OCCLUDED] > 10)
 
 
 def test_the_inverse_of_a_pose() -> None:
     pose, back = Pose(3.0, -2.0, 0.9), np.empty(3)
-    fast.invert_pose(pose.to_array(), back)
+    free.invert_pose(pose.to_array(), back)
     np.testing.assert_allclose(back, pose.inverse().to_array(), atol=1e-12)

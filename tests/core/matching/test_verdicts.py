@@ -60,7 +60,7 @@ def test_a_plain_corridor_is_never_matched_in_full(lidar: Lidar, heading: float)
     corridor = World(np.array([[-60.0, 0.0, 60.0, 0.0], [60.0, 2.4, -60.0, 2.4]]))
     a, b = Pose(0.0, 1.1, 0.2), Pose(0.8, 1.3, heading)
     result = two_scans(corridor, lidar, a, b)
-    assert result.verdict in {"weak", "none"}
+    assert result.verdict in {"weak", "ambiguous", "none"}
     if result.weak_direction is not None and result.T_reference_current is not None:
         assert abs(math.sin(result.weak_direction + 0.2)) < 0.02
         about_middle = Pose(0.0, 2.4, math.pi)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 from lineloom_core.geometry import Pose, wrap
-from lineloom_core.matching import _kernels as matching
+from lineloom_core.matching import _free_space_kernels, _refinement_kernels
 from lineloom_core.places import Place
 from numpy.typing import NDArray
 
@@ -51,12 +51,16 @@ def cascade(
     ranked = []
     for row in proposals[:coarse_keep]:
         counts = judge_places(ref, cur, row[:3], 8, base + 0.15, slope + 0.01, every=3)
-        ranked.append(row[3] + 0.4 * (counts[matching.MATCHED] - 2.0 * counts[matching.CONFLICT]))
+        ranked.append(
+            row[3]
+            + 0.4
+            * (counts[_free_space_kernels.MATCHED] - 2.0 * counts[_free_space_kernels.CONFLICT])
+        )
     best = sorted(range(len(ranked)), key=lambda k: -ranked[k])[:fine_keep]
     rows: list[Floats] = []
     for k in best:
         pose, H = proposals[k, :3].copy(), np.empty((3, 3))
-        overlap = matching.refine(
+        overlap = _refinement_kernels.refine(
             ref.lines, ref.ends, ref.edges, cur.lines, cur.ends, cur.edges, pose, H, iterations
         )
         is_twin = any(

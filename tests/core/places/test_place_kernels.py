@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from lineloom_core.geometry import Pose
-from lineloom_core.matching import _kernels as matching
+from lineloom_core.matching import _free_space_kernels, _proposal_kernels
 from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
 from lineloom_core.places import Place
 from lineloom_core.places import _kernels as fast
@@ -20,7 +20,7 @@ ARGS = (TOLERANCE, TOLERANCE_SLOPE)
 # Compiled functions carry no types.
 judge_places: Any = fast.judge_places
 match_places: Any = fast.match_places
-propose: Any = matching.propose
+propose: Any = _proposal_kernels.propose
 PROPOSING = (8, 12, 0.25, 80, 0.25, 16.0, 0.3)
 
 
@@ -54,9 +54,9 @@ def test_free_space_between_places(
     expected = slow.judge_places(ref, cur, T.to_array(), step, *ARGS)
     assert expected.sum() == len(ref.surface.points[::step]) + len(cur.surface.points[::step])
     np.testing.assert_allclose(counts, expected, atol=1)  # a point at the border of two beams
-    assert expected[matching.MATCHED] > 10
+    assert expected[_free_space_kernels.MATCHED] > 10
     if off.x and step == 1:
-        assert expected[matching.CONFLICT] > 20
+        assert expected[_free_space_kernels.CONFLICT] > 20
         assert count_points(ref, cur, T) == (counts[0], counts[1])
 
 
