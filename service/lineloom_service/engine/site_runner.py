@@ -23,6 +23,9 @@ _LOG = logging.getLogger(__name__)
 _FEEDS_UNDER_WAY = 2
 """One being mapped, the next one waiting at the worker's door."""
 
+_GATHER_S = 0.02
+"""A site that was idle waits so long for more: one by one, scans cost several times as much."""
+
 _STRIKES = {"raised": 2, "crashed": 3, "killed": 10}
 """An entry is skipped after so many failures without a success in between.
 
@@ -175,6 +178,8 @@ class SiteRunner:
             await asyncio.wait_for(self._wake.wait(), pause)
         except TimeoutError:
             await self.save()
+        else:
+            await asyncio.sleep(_GATHER_S)
 
     async def _strike(self, position: int, how: str, reason: str) -> None:
         self._strikes[position] += 1
