@@ -150,7 +150,9 @@ def _answer(matcher: Matcher[Any], start: Start, row: BenchPair) -> _Answer:
     begin = time.process_time()
     reference, current = matcher.prepare(row.pair.reference), matcher.prepare(row.pair.current)
     prepared = time.process_time()
-    if start == "guess" and isinstance(matcher, GuidedMatcher):
+    if start == "guess":
+        if not isinstance(matcher, GuidedMatcher):
+            raise TypeError(f"{matcher.name} takes no guess")
         result = matcher.match_from(reference, current, row.guess)
     else:
         result = matcher.match_prepared(reference, current)

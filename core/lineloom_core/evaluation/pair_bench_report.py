@@ -8,6 +8,7 @@ from typing import Any
 
 from lineloom_core.evaluation.pair_bench import BenchRow, Figures
 from lineloom_core.evaluation.pair_bench_sets import BenchSet
+from lineloom_core.evaluation.pairs import TIERS
 
 LEGEND = """\
 Tiers and overlap bins: full pose right (< 0.3 m, < 5 degrees), in percent; after the slash also
@@ -38,7 +39,8 @@ def to_markdown(rows: Sequence[BenchRow], sets: Sequence[BenchSet]) -> str:
 
 def _table(collection: str, rows: Sequence[BenchRow], sets: Sequence[BenchSet]) -> str:
     pairs = [row for s in sets if s.collection == collection for row in s.pairs]
-    groups = [group for group in dict.fromkeys(row.group for row in pairs) if group != "neg"]
+    found = dict.fromkeys(row.group for row in pairs if row.group != "neg")
+    groups = sorted(found, key=lambda group: TIERS.index(group) if group in TIERS else 0)
     names = [s.name for s in sets if s.collection == collection]
     title = collection if names == [collection] else f"{collection}: {', '.join(names)}"
     header = ["matcher", "start", *groups, "cw %", "r@1 %", "r@0", "ms", "ms whole"]

@@ -32,7 +32,7 @@ class KartoConfig:
     angle: float = math.radians(20.0)
     resolution: float = 0.025
     smear: float = 0.05
-    least_score: float = 0.5
+    least_score: float = 0.58
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,11 +33,11 @@ class KissMatcherConfig:
     spacing: float = 0.05
     height: float = 0.1
     layers: int = 5
-    voxel: float = 0.1
+    voxel: float = 0.15
     normal_gain: float = 3.0
-    feature_gain: float = 10.0
+    feature_gain: float = 8.0
     enough: float = 20.0
-    least_score: float = 0.5
+    least_score: float = 0.73
 
 
 class KissMatcherMatcher:

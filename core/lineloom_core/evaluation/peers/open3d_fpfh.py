@@ -34,15 +34,15 @@ class Open3dConfig:
     of a sampled triangle must be. iterations, confidence: of RANSAC. seed: of its dice.
     """
 
-    spacing: float = 0.1
-    feature_radius: float = 1.5
+    spacing: float = 0.07
+    feature_radius: float = 2.0
     tilt: float = math.radians(30.0)
     inlier: float = 0.2
     edge_length: float = 0.9
     iterations: int = 20_000
     confidence: float = 0.999
     refined_inlier: float = 0.15
-    least_score: float = 0.6
+    least_score: float = 0.54
     seed: int = 0
 
 

@@ -38,26 +38,28 @@ class AngleHistogramConfig:
     """Parameters; metres, radians, shares 0..1.
 
     bins: of the full turn. chord: least distance of the points a direction is taken between.
-    smoothing: half width of the triangle that histograms are smoothed with, in bins. peaks:
-    rotations tried. cell: width of the x and y bins. extent: half width of the x and y histograms.
-    reach: greatest translation along each axis. least_score: from which on the verdict is "match".
+    least_chords: directions without which a scan has no histogram. smoothing: half width of the
+    triangle that histograms are smoothed with, in bins. peaks: rotations tried. cell: width of the
+    x and y bins. extent: half width of the x and y histograms. reach: greatest translation along
+    each axis. least_score: from which on the verdict is "match".
     """
 
     bins: int = 360
     chord: float = 0.2
+    least_chords: int = 5
     smoothing: int = 2
     peaks: int = 4
     cell: float = 0.05
     extent: float = 26.0
     reach: float = 4.0
-    least_score: float = 0.7
+    least_score: float = 0.76
     extraction: ExtractionConfig = field(default_factory=ExtractionConfig)
 
 
 @dataclass(frozen=True, eq=False)
 class AngleScan:
     """points (n, 2) [m] with weights (n,), their share of wall; histogram (bins,) of directions,
-    smoothed, of unit norm (zero where a scan has no chord).
+    smoothed, of unit norm (zero where a scan has too few chords).
     """
 
     points: Array
@@ -84,7 +86,10 @@ class AngleHistogramMatcher:
         bins = self.config.bins
         which = np.floor((np.arctan2(along[:, 1], along[:, 0]) / math.tau % 1.0) * bins).astype(int)
         lengths = np.minimum(np.linalg.norm(along, axis=1), 2.0 * self.config.chord)
-        counts = np.bincount(which % bins, weights=lengths, minlength=bins)
+        sums = np.bincount(which % bins, weights=lengths, minlength=bins)
+        counts = np.asarray(sums, dtype=np.float64)
+        if len(starts) < self.config.least_chords:
+            counts = np.zeros(bins)
         ranges = np.linalg.norm(features.points, axis=1)
         weights = np.minimum(ranges * features.angle_increment, self.config.cell)
         return AngleScan(features.points, weights, _unit(self._smooth(counts)))
@@ -92,7 +97,7 @@ class AngleHistogramMatcher:
     def match_prepared(self, reference: AngleScan, current: AngleScan) -> MatchResult:
         """Find T_reference_current."""
         if not reference.histogram.any() or not current.histogram.any():
-            return nothing("no two points of one surface lie far enough apart to have a direction")
+            return nothing(f"fewer than {self.config.least_chords} directions in a scan")
         spectrum = np.fft.rfft(reference.histogram) * np.conj(np.fft.rfft(current.histogram))
         agreement = np.fft.irfft(spectrum, n=self.config.bins)
         best: tuple[float, Pose, dict[str, float]] | None = None
@@ -141,7 +146,7 @@ class AngleHistogramMatcher:
         cells = place - size if place > size / 2 else place
         return cells * self.config.cell, min(max(float(agreement[best]), 0.0), 1.0)
 
-    def _smooth(self, counts: NDArray[np.integer] | Array) -> Array:
+    def _smooth(self, counts: Array) -> Array:
         """Smooth a histogram with a triangle, cyclically."""
         half = self.config.smoothing
         smoothed = np.zeros_like(counts, dtype=np.float64)

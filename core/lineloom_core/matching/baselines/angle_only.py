@@ -48,7 +48,7 @@ class AngleOnlyConfig:
     farthest: float = 10.0
     overlap_angle: float = math.radians(5.0)
     overlap_distance: float = 0.15
-    least_score: float = 0.6
+    least_score: float = 0.56
     extraction: ExtractionConfig = field(default_factory=ExtractionConfig)
 
 

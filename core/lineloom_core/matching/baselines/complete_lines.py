@@ -45,7 +45,7 @@ class CompleteLinesConfig:
     centre: float = 0.2
     angle: float = math.radians(6.0)
     least_pairs: int = 2
-    least_score: float = 0.5
+    least_score: float = 0.55
     extraction: ExtractionConfig = field(default_factory=ExtractionConfig)
 
 

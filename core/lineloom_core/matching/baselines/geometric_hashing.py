@@ -53,7 +53,7 @@ class GeometricHashingConfig:
     vote_distance: float = 0.3
     vote_angle: float = math.radians(6.0)
     least_votes: int = 4
-    least_score: float = 0.5
+    least_score: float = 0.43
     extraction: ExtractionConfig = field(default_factory=ExtractionConfig)
 
 

@@ -49,7 +49,7 @@ class IdcConfig:
     iterations: int = 40
     most_points: int = 180
     explained: float = 0.06
-    least_score: float = 0.7
+    least_score: float = 0.78
     extraction: ExtractionConfig = field(default_factory=ExtractionConfig)
 
 
@@ -107,7 +107,7 @@ class IdcMatcher:
             # The paper's rule: translation from the closest points, rotation from the ranges.
             pose, step = _combined(pose, by_distance, by_range)
             window *= math.exp(-self.config.narrowing)
-            if step < 1e-4:
+            if step < 3e-4:
                 break
         moved = pose.transform(points)
         distance = np.linalg.norm(closest_points(reference, moved) - moved, axis=1)
@@ -155,15 +155,19 @@ def closest_points(reference: PointScan, moved: Array) -> Array:
     return np.asarray(best, dtype=np.float64)
 
 
-def matching_ranges(reference: PointScan, moved: Array, pose: Pose, window: float) -> Array:
+def matching_ranges(
+    reference: PointScan, moved: Array, pose: Pose, window: float, most_points: int = 360
+) -> Array:
     """Return for each point (n, 2) the reference point of nearest range within +-window [rad].
 
     (n, 2) [m]; NaN where the reference has no point in that window. Ranges and bearings are taken
     about the current scan's position under `pose`, not the reference's: about it a scan that is
-    only turned too far keeps every range, however far the guess has already moved it.
+    only turned too far keeps every range, however far the guess has already moved it. The reference
+    is thinned evenly to `most_points`.
     """
     centre = pose.to_array()[:2]
-    arm, target = moved - centre, reference.points - centre
+    known = reference.points[:: math.ceil(len(reference.points) / most_points)]
+    arm, target = moved - centre, known - centre
     ranges, target_ranges = np.linalg.norm(arm, axis=1), np.linalg.norm(target, axis=1)
     product = np.maximum(ranges[:, None] * target_ranges[None, :], 1e-12)
     dot = arm[:, :1] * target[:, 0] + arm[:, 1:] * target[:, 1]
@@ -171,7 +175,7 @@ def matching_ranges(reference: PointScan, moved: Array, pose: Pose, window: floa
     cost = np.where(inside, np.abs(target_ranges[None, :] - ranges[:, None]), np.inf)
     nearest = np.argmin(cost, axis=1)
     found = np.isfinite(cost[np.arange(len(moved)), nearest])
-    return np.where(found[:, None], reference.points[nearest], np.nan)
+    return np.where(found[:, None], known[nearest], np.nan)
 
 
 def _combined(pose: Pose, by_distance: Pose, by_range: Pose) -> tuple[Pose, float]:

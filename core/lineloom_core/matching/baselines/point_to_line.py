@@ -47,7 +47,7 @@ class PointToLineConfig:
     iterations: int = 40
     most_points: int = 360
     explained: float = 0.06
-    least_score: float = 0.7
+    least_score: float = 0.74
     extraction: ExtractionConfig = field(default_factory=ExtractionConfig)
 
 
