@@ -100,27 +100,7 @@ class LineMatcher:
         band = next((b for b in map(as_band, bands) if b.convincing), None)
         if band is None:
             return _unsure(result)
-        if result.verdict == "ambiguous" and self._contradicts(result, band):
-            return result
         return _as_weak(result, band, line_pairs(reference, current, band.T_reference_current))
-
-    def _contradicts(self, result: MatchResult, band: Band) -> bool:
-        """A full pose that fits as well as any denies what the band claims to know.
-
-        As in a symmetric room: then more than parallel walls is shared, and it fits several ways.
-        """
-        if result.best is None or result.checks["information"] < self.config.weak_below:
-            return False
-        least = (1.0 - self.config.least_margin) * result.score
-        equals = [a.T_reference_current for a in result.alternatives if a.score > least]
-        c, s = math.cos(band.direction), math.sin(band.direction)
-        claimed = band.T_reference_current
-        for T in (result.best, *equals):
-            across = abs(c * (T.y - claimed.y) - s * (T.x - claimed.x))
-            turned = abs(angle_difference(T.theta, claimed.theta))
-            if across > self.config.rival_distance or turned > self.config.rival_angle:
-                return True
-        return False
 
     def _decide(
         self, reference: ScanFeatures, current: ScanFeatures, table: NDArray[np.float64]
