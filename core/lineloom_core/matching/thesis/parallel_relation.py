@@ -38,7 +38,13 @@ class ParallelRelations:
     @staticmethod
     def of(L: LineSegments, both_orders: bool, windows: Windows) -> ParallelRelations:
         """Extract one relation per pair of parallel line segments."""
-        k, m = line_pairs(len(L), both_orders)
+        return ParallelRelations.between(L, *line_pairs(len(L), both_orders), windows)
+
+    @staticmethod
+    def between(
+        L: LineSegments, k: NDArray[np.int64], m: NDArray[np.int64], windows: Windows
+    ) -> ParallelRelations:
+        """Extract one relation per pair (k, m) that is parallel; k, m: (q,) extraction numbers."""
         beta = relative_angle(L.directions[k], L.directions[m])
         tilt = 0.5 * wrap_array(2.0 * beta)  # how far from parallel, whichever way they run
         parallel = np.abs(tilt) <= windows.angle
