@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from lineloom_core.graph import PoseGraph, optimize
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.constraint import Constraint
 from lineloom_core.mapping.keyframe import Keyframe
+from lineloom_core.mapping.place_making import make_place
 from lineloom_core.mapping.positions import Positions
 from lineloom_core.mapping.robot_record import Track
 from lineloom_core.places import Place
@@ -33,6 +35,17 @@ class SiteMap:
         """By pair of places: how much of one could be mistaken for the other (`distinctive`)."""
         self._positions = Positions()
         self._numbers = {"keyframe": 0, "track": 0, "place": 0, "constraint": 0}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Places are functions of their keyframes and by far the largest part: left out."""
+        return {**self.__dict__, "places": [(p.id, p.keyframes) for p in self.places.values()]}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self.places = {
+            number: make_place(number, members, self.keyframes)
+            for number, members in state["places"]
+        }
 
     def number(self, what: str) -> int:
         """The next free number for a keyframe, track, place or constraint."""

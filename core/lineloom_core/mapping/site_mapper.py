@@ -27,13 +27,13 @@ from lineloom_core.mapping.closing import close_nearby
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.constraint import Constraint, step_information
 from lineloom_core.mapping.keyframe import Keyframe
+from lineloom_core.mapping.place_making import make_place, place_is_due, recent_keyframes
 from lineloom_core.mapping.robot_record import PlacedScan, RobotRecord, Track
 from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.mapping.site_view import SiteView
 from lineloom_core.mapping.tracker import Tracked, Tracker
 from lineloom_core.mapping.view_builder import build_view
 from lineloom_core.matching.local_map import Cloud, LocalMap
-from lineloom_core.places import Glimpse, Place
 from lineloom_core.scan import Mount, Scan
 
 SNAPSHOT_FORMAT = 2
@@ -204,35 +204,18 @@ class SiteMapper:
     def _recognise(self, track: Track) -> tuple[list[ComponentMerged], bool]:
         """Make a place when the robot has driven on far enough, and look for it elsewhere."""
         config = self._config.places
-        travelled = track.travelled[-1]
-        if travelled - track.last_place_at < config.stride or travelled < config.span:
+        if not place_is_due(track, config):
             return [], False
-        track.last_place_at = travelled
-        place = self._make_place(track)
-        if place is None:
+        track.last_place_at = track.travelled[-1]
+        members = recent_keyframes(track, config)
+        if len(members) < config.least_keyframes:
             return [], False
+        place = make_place(self._site.number("place"), members, self._site.keyframes)
         self._site.places[place.id] = place
         merges, moved = consider(self._site, place)
         for merge in merges:
             self._tie_after(merge)
         return merges, moved
-
-    def _make_place(self, track: Track) -> Place | None:
-        """A place of the last `span` metres of a track, anchored at its middle keyframe."""
-        config = self._config.places
-        start = track.travelled[-1] - config.span
-        members = [k for k, at in zip(track.keyframes, track.travelled, strict=True) if at >= start]
-        while len(members) > config.most_keyframes:
-            members = members[::2]
-        if len(members) < config.least_keyframes:
-            return None
-        anchor = self._site.keyframes[members[len(members) // 2]]
-        glimpses = []
-        for k in members:
-            frame = self._site.keyframes[k]
-            T_anchor_laser = anchor.T_track_laser.between(frame.T_track_laser)
-            glimpses.append(Glimpse(k, frame.features, frame.cloud, T_anchor_laser))
-        return Place.of(self._site.number("place"), track.id, anchor.id, glimpses)
 
     def _tie_after(self, merge: ComponentMerged) -> None:
         """After a merge, tie the two parts wherever they run near each other."""

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +85,15 @@ class Tracker:
         self._stamp = 0.0
         self._odometry: Pose | None = None
         self._misses = 0
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The local map is a function of the recent keyframes: left out."""
+        return {**self.__dict__, "_map": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        if self._recent:
+            self._map = LocalMap.build(reversed(self._recent))
 
     def track(
         self, features: ScanFeatures, cloud: Cloud, stamp: float, odometry: Pose | None = None

@@ -1,0 +1,39 @@
+"""Making places of a track's last keyframes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from lineloom_core.mapping.config import PlaceConfig
+from lineloom_core.mapping.keyframe import Keyframe
+from lineloom_core.mapping.robot_record import Track
+from lineloom_core.places import Glimpse, Place
+
+
+def place_is_due(track: Track, config: PlaceConfig) -> bool:
+    """Whether the robot has driven on far enough since its last place."""
+    driven = track.travelled[-1]
+    return driven >= config.span and driven - track.last_place_at >= config.stride
+
+
+def recent_keyframes(track: Track, config: PlaceConfig) -> list[int]:
+    """The keyframes of the last `span` metres, thinned to at most `most_keyframes`."""
+    start = track.travelled[-1] - config.span
+    members = [k for k, at in zip(track.keyframes, track.travelled, strict=True) if at >= start]
+    while len(members) > config.most_keyframes:
+        members = members[::2]
+    return members
+
+
+def make_place(number: int, members: Sequence[int], keyframes: Mapping[int, Keyframe]) -> Place:
+    """The place that consecutive keyframes of one track show, anchored at the middle one.
+
+    A function of the keyframes alone, so that a snapshot need not hold places.
+    """
+    anchor = keyframes[members[len(members) // 2]]
+    glimpses = []
+    for k in members:
+        frame = keyframes[k]
+        T_anchor_laser = anchor.T_track_laser.between(frame.T_track_laser)
+        glimpses.append(Glimpse(k, frame.features, frame.cloud, T_anchor_laser))
+    return Place.of(number, anchor.track, anchor.id, glimpses)
