@@ -1,0 +1,75 @@
+"""`make bench`, or `python -m tests.benchmarks.run [--json] [--quick] [--no-http]`.
+
+Prints every speed that the project promises, each beside a baseline measured in the same run: the
+ratio means the same on every machine, the figure only on this one. No test depends on either.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+from lineloom_core.warm_up import warm_up
+
+from tests.benchmarks.drives import driving
+from tests.benchmarks.row import Row, table
+from tests.benchmarks.single_scans import extraction, matching
+
+DATA = Path(__file__).parents[3] / "shared" / "data"
+
+
+def measure(data: Path, *, quick: bool, http: bool) -> list[Row]:
+    """Measure everything, telling on stderr what is at work."""
+    _tell("warming up")
+    warm_up()
+    _tell("features")
+    rows = extraction(quick=quick)
+    _tell("pairs of scans")
+    rows += matching(data, quick=quick)
+    if not (data / "mit-csail").is_dir():
+        _tell(f"no drives and no real pairs: {data} is missing")
+        return rows
+    _tell("drives")
+    return rows + driving(data, quick=quick, http=http)
+
+
+def as_json(rows: list[Row]) -> str:
+    """The rows and the machine as one JSON document."""
+    machine = {
+        "cores": os.cpu_count(),
+        "load": os.getloadavg()[0],
+        "machine": platform.machine(),
+        "python": platform.python_version(),
+    }
+    listed = [asdict(row) | {"ratio": row.ratio, "reached": row.reached} for row in rows]
+    return json.dumps({"machine": machine, "rows": listed}, indent=2, ensure_ascii=False)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--json", action="store_true", help="print one JSON document")
+    parser.add_argument("--quick", action="store_true", help="few scans: does it run at all?")
+    parser.add_argument("--no-http", action="store_true", help="leave the service out")
+    parser.add_argument("--data", type=Path, default=DATA, help="folder of the real data")
+    options = parser.parse_args()
+    rows = measure(options.data, quick=options.quick, http=not options.no_http)
+    if options.json:
+        print(as_json(rows))
+        return
+    print(table(rows))
+    cores, load = os.cpu_count(), os.getloadavg()[0]
+    print(f"\n{cores} cores, load {load:.1f}. Medians of CPU time; HTTP by the wall clock.")
+
+
+def _tell(what: str) -> None:
+    print(f"… {what}", file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,56 @@
+"""The benchmark's own arithmetic: what a goal and a ratio mean; and that it runs."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from tests.benchmarks.row import Row, median_seconds, table
+
+FAST = Row("a", 50.0, "µs", "lower", 60.0, "twin", 500.0)
+MANY = Row("b", 80.0, "x", "higher", 40.0, "driving", 2.0)
+
+
+def test_a_ratio_says_how_many_times_better() -> None:
+    assert FAST.ratio == pytest.approx(10.0)
+    assert MANY.ratio == pytest.approx(40.0)
+
+
+def test_goals_look_the_right_way() -> None:
+    assert FAST.reached is True
+    assert replace(FAST, figure=61.0).reached is False
+    assert MANY.reached is True
+    assert replace(MANY, figure=39.0).reached is False
+    assert replace(MANY, goal=None).reached is None
+
+
+def test_the_table_shows_a_missed_goal() -> None:
+    text = table([FAST, replace(MANY, figure=3.0)])
+    assert text.splitlines()[2].split()[0] == "a"
+    assert "yes" in text.splitlines()[2]
+    assert "NO" in text.splitlines()[3]
+
+
+def test_the_median_is_taken_after_one_run_for_nothing() -> None:
+    seen: list[int] = []
+    median_seconds(seen.append, [1, 2, 3], repeats=2)
+    assert seen == [1, 1, 1, 2, 2, 3, 3]
+
+
+def test_the_benchmark_runs_without_data_and_prints_json(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "tests.benchmarks.run", "--quick", "--no-http", "--json"]
+    done = subprocess.run(
+        [*command, "--data", str(tmp_path)],
+        cwd=Path(__file__).parents[2],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    rows = json.loads(done.stdout)["rows"]
+    assert {row["name"].split(",")[0] for row in rows} == {"features", "pair"}
+    assert all(row["ratio"] > 0.0 for row in rows)
