@@ -12,7 +12,7 @@ from lineloom_core.matching.thesis import ThesisMatcher
 from lineloom_core.simulation import sick_lms200, world_named
 
 
-def is_right(matcher: ThesisMatcher, pair: SimulatedPair) -> tuple[list[float], bool] | None:
+def descriptors(matcher: ThesisMatcher, pair: SimulatedPair) -> tuple[list[float], bool] | None:
     """Descriptors of the best hypothesis and whether it is right; None where there is none."""
     result = matcher.match(pair.reference, pair.current)
     if result.best is None:
@@ -23,14 +23,15 @@ def is_right(matcher: ThesisMatcher, pair: SimulatedPair) -> tuple[list[float], 
 
 
 def main() -> None:
+    """Print the constants."""
     matcher = ThesisMatcher()
     rows = []
     for seed in range(300, 306):
         for name in ("office", "rooms", "corridors"):
             rng = np.random.default_rng([seed, len(name)])
             world = world_named(name, seed)
-            for pair in simulated_pairs(world, sick_lms200(), rng, 100, people=6):
-                rows.append(is_right(matcher, pair))
+            pairs = simulated_pairs(world, sick_lms200(), rng, 100, people=6)
+            rows += [descriptors(matcher, pair) for pair in pairs]
     x = np.array([r[0] for r in rows if r is not None])
     y = np.array([r[1] for r in rows if r is not None])
     weights, bias = fit_logistic(x, y)
