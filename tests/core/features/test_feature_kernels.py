@@ -222,3 +222,22 @@ def test_normals_look_at_the_sensor() -> None:
     towards = np.einsum("ij,ij->i", features.normals(), -features.points)
     assert np.all(towards >= 0.0)
     assert np.count_nonzero(towards > 0.0) > 900
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_how_far_a_beam_must_go_on_beside_an_end(side: int) -> None:
+    """A wall 3 m ahead; the beam beside its end goes on by more and more."""
+    angles = np.radians(np.arange(-20.0, 21.0))
+    ranges = 3.0 / np.cos(angles)
+    ranges[[0, -1]] = math.nan
+    xy, beam = slow.points_of(ranges, float(angles[0]), math.radians(1.0))
+    lines = slow.lines_of(xy, beam, [(0, 38, 0)], 0.015, 5, 0.2)
+    types = []
+    for beyond in np.arange(-0.1, 0.3, 0.005):
+        ranges[-side] = 3.0 / math.cos(math.radians(20.0)) + beyond
+        args = (ranges, float(angles[0]), math.radians(1.0), 0.015, False, 0.35)
+        ends, _ = fast.classify_ends(lines, *args)
+        assert ends[0, side] == slow.end_of(lines, 0, side, *args)[0]
+        types.append(int(ends[0, side]))
+    assert types == sorted(types)
+    assert set(types) == {INTERIOR, EDGE}
