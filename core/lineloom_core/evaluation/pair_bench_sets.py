@@ -21,6 +21,9 @@ SIMULATED_SEED = 300
 """Far from the seeds that the score is calibrated on (`evaluation.calibration`)."""
 PEOPLE = 8
 OVERLAP_BINS = ((0.75, 1.01), (0.5, 0.75), (0.25, 0.5))
+MOST_NEGATIVE_OVERLAP = 0.05
+"""More of it, and two scans have something to be found however far apart they are: along one
+corridor a lidar sees 30 m."""
 GUESS_RADIUS_M = 0.4
 GUESS_ANGLE_RAD = math.radians(10.0)
 """How far off a good guess is at most, as in the real files."""
@@ -122,12 +125,14 @@ def _simulated_set(name: str, lidar: Lidar, per_group: int, seed: int) -> BenchS
 
 
 def _bench_pair(drawn: SimulatedPair, rng: np.random.Generator) -> BenchPair | None:
-    """Sort a simulated pair by overlap; None for too little of it, though nearby."""
+    """Sort a simulated pair by overlap; None for too little of it nearby or too much far away."""
     truth = drawn.T_reference_current
     guess = _good_guess(truth, rng)
     overlap = overlap_share(drawn.reference, drawn.current, truth)
     if drawn.negative:
-        pair = Pair(drawn.reference, drawn.current, "neg", truth, 0.0)
+        if overlap > MOST_NEGATIVE_OVERLAP:
+            return None
+        pair = Pair(drawn.reference, drawn.current, "neg", truth, overlap)
         return BenchPair(pair, "neg", Pose.identity())
     for low, high in OVERLAP_BINS:
         if low <= overlap < high:

@@ -42,7 +42,7 @@ class SmallGicpConfig:
     neighbours: int = 12
     iterations: int = 60
     kind: str = "GICP"
-    least_score: float = 0.76
+    least_score: float = 0.73
 
 
 @dataclass(frozen=True, eq=False)

@@ -52,7 +52,7 @@ class AngleHistogramConfig:
     cell: float = 0.05
     extent: float = 26.0
     reach: float = 4.0
-    least_score: float = 0.76
+    least_score: float = 0.7
     extraction: ExtractionConfig = field(default_factory=ExtractionConfig)
 
 

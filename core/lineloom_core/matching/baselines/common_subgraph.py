@@ -52,7 +52,7 @@ class CommonSubgraphConfig:
     angle: float = math.radians(4.0)
     same_point: float = 0.1
     least_clique: int = 4
-    least_score: float = 0.53
+    least_score: float = 0.54
     extraction: ExtractionConfig = field(default_factory=ExtractionConfig)
 
 
