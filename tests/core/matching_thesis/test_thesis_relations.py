@@ -173,7 +173,10 @@ def two_corners(d: float = 3.0) -> Edges:
     """Corners at (0, 0) and (d, 0): lines 0 and 1 meet in the one, 2 and 3 in the other."""
     quarter = math.pi / 2
     return Edges.of(
-        ANGLE, np.array([[0.0, 0.0], [d, 0.0]]), [[0, 1], [2, 3]], np.array([[-quarter, 0.0], [0.0, quarter]])
+        ANGLE,
+        np.array([[0.0, 0.0], [d, 0.0]]),
+        [[0, 1], [2, 3]],
+        np.array([[-quarter, 0.0], [0.0, quarter]]),
     )
 
 

@@ -68,10 +68,6 @@ class LineMap:
             map_id = self.renamed[map_id]
         return map_id
 
-    def with_line(self, line: MapLine) -> LineMap:
-        """Return the map with a line more, or with its line of that mapID replaced."""
-        return LineMap({**self.lines, line.map_id: line}, self.renamed)
-
     def with_merged(self, line: MapLine, merged_ids: Iterable[int]) -> LineMap:
         """Return the map with `line` in place of all of `merged_ids`."""
         gone = set(merged_ids)

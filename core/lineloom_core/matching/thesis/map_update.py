@@ -36,7 +36,8 @@ def update_map(
     is aligned over L_r which was integrated into map").
     Departures: mapIDs are returned for L_c, or the next scan could not find its lines in the map;
     all merged lines are removed from the map, not one of them; the last loop, as printed, numbers
-    the lines that have no match but never adds them; lines of the map must also face the same way
+    the lines that have no match but never adds them; a line with a match in L_r may lie on further
+    lines of the map as well, and joins them; lines of the map must also face the same way
     (beta about 0), or both faces of a thin wall would become one.
     Raises KeyError where ids_r names a line that the map never had.
     """
@@ -45,18 +46,25 @@ def update_map(
         matching_pairs = []
     ids: dict[int, int] = {}
     for k, m in matching_pairs:  # common line segments of L_c and L_r
-        line = line_map.lines[line_map.current_id(ids_r[k])]
-        line_map = line_map.with_line(merge_all([line, MapLine.of(L_c, m, line.map_id)]))
-        ids[m] = line.map_id
-    for i in range(len(L_c)):  # no match in L_r, but in the map
-        if i in ids:
-            continue
-        own = MapLine.of(L_c, i, line_map.next_id)
-        same = lines_on(line_map, L_c, i, windows)
-        merged = merge_all([own, *(line_map.lines[q] for q in same)])
-        line_map = line_map.with_merged(merged, same)  # nowhere a match: a line of its own
-        ids[i] = merged.map_id
+        common = line_map.current_id(ids_r[k])
+        line_map, ids[m] = _integrated(line_map, L_c, m, {common}, windows)
+    for i in range(len(L_c)):  # no match in L_r: one in the map, or a line of its own
+        if i not in ids:
+            line_map, ids[i] = _integrated(line_map, L_c, i, set(), windows)
     return MapUpdate(line_map, tuple(line_map.current_id(ids[i]) for i in range(len(L_c))))
+
+
+def _integrated(
+    line_map: LineMap, L_c: LineSegments, i: int, common: set[int], windows: Windows
+) -> tuple[LineMap, int]:
+    """Merge l_i with the map's lines of mapIDs `common` and all it lies on, or add it (MergeAll).
+
+    Raises KeyError where the map has no line of such a mapID.
+    """
+    same = sorted(common.union(lines_on(line_map, L_c, i, windows)))
+    own = MapLine.of(L_c, i, line_map.next_id)
+    merged = merge_all([own, *(line_map.lines[q] for q in same)])
+    return line_map.with_merged(merged, same), merged.map_id
 
 
 def lines_on(line_map: LineMap, L_c: LineSegments, i: int, windows: Windows) -> list[int]:

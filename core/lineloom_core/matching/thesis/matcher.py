@@ -154,7 +154,7 @@ class ThesisMatcher:
                 "lead": lead,
             },
             alternatives=tuple(
-                Alternative(h.alignment.T_reference_current, score * h.total / best.total)
+                Alternative(h.alignment.T_reference_current, score * min(h.total / best.total, 1.0))
                 for h in rivals
             ),
             best=pose,
