@@ -19,7 +19,7 @@ from lineloom_core.mapping.changes import ComponentMerged
 from lineloom_core.mapping.constraint import CONSTRAINT_FLOOR, Constraint
 from lineloom_core.mapping.distinctive import is_distinctive
 from lineloom_core.mapping.site_map import SiteMap
-from lineloom_core.places.recognition import count_points
+from lineloom_core.places import Place, count_points
 
 
 def join(site: SiteMap, root: int, keyframe: int) -> ComponentMerged | None:
@@ -34,7 +34,7 @@ def join(site: SiteMap, root: int, keyframe: int) -> ComponentMerged | None:
     members_a = {n: site.pose(n) for n in site.graph.component_of(a_root)}
     members_b = {n: site.pose(n) for n in site.graph.component_of(b_root)}
     T_A_B = rigid_join(members_a, members_b, [c.edge() for c in chosen])
-    share = _conflict_share(site, a_root, b_root, T_A_B)
+    share = _conflict_share(site, chosen, T_A_B)
     if share > site.config.join.most_conflict:
         return None
     survivor, absorbed = site.component_id(a_root), site.component_id(b_root)
@@ -120,22 +120,34 @@ def _objection_to_set(site: SiteMap, chosen: list[Constraint], rival: list[Const
     return ""
 
 
-def _conflict_share(site: SiteMap, a_root: int, b_root: int, T_A_B: Pose) -> float:
-    """Free-space conflict over all places of both components that would overlap."""
+def _conflict_share(site: SiteMap, chosen: list[Constraint], T_A_B: Pose) -> float:
+    """Free-space conflict, beyond the places' own, over all that would overlap near the set.
+
+    Near: as far as drift lets the two maps be compared as rigid pieces.
+    """
+    near_a = _places_near(site, [c.keyframe_a for c in chosen])
+    near_b = _places_near(site, [c.keyframe_b for c in chosen])
     matched = conflict = 0.0
-    for a in site.places.values():
-        if site.component_root(a.anchor) != a_root:
-            continue
-        for b in site.places.values():
-            if site.component_root(b.anchor) != b_root:
-                continue
+    for a in near_a:
+        for b in near_b:
             T_a_b = site.pose(a.anchor).between(T_A_B @ site.pose(b.anchor))
             if np.hypot(T_a_b.x, T_a_b.y) > site.config.places.span:
                 continue
             m, c = count_points(a, b, T_a_b)
             matched += m
-            conflict += c
+            conflict += max(c - (a.own_conflict + b.own_conflict) * (m + c), 0.0)
     return conflict / max(matched + conflict, 1.0)
+
+
+def _places_near(site: SiteMap, keyframes: list[int]) -> list[Place]:
+    """Places of the component whose drift against the nearest of the keyframes is small."""
+    most = site.config.join.rigid_within**2
+    return [
+        place
+        for place in site.places.values()
+        if site.same_component(place.anchor, keyframes[0])
+        and min(site.drift(k, place.anchor)[0, 0] for k in keyframes) <= most
+    ]
 
 
 def _drop_others(site: SiteMap, candidates: list[Constraint], chosen: list[Constraint]) -> None:

@@ -1,6 +1,6 @@
 """Places: submaps that are recognised without any pose."""
 
-from lineloom_core.places.place import Glimpse, Place
+from lineloom_core.places.place import Glimpse, Place, count_points
 from lineloom_core.places.recognition import (
     Recognition,
     RecognitionConfig,
@@ -8,4 +8,12 @@ from lineloom_core.places.recognition import (
     recognise,
 )
 
-__all__ = ["Glimpse", "Place", "Recognition", "RecognitionConfig", "alias_evidence", "recognise"]
+__all__ = [
+    "Glimpse",
+    "Place",
+    "Recognition",
+    "RecognitionConfig",
+    "alias_evidence",
+    "count_points",
+    "recognise",
+]

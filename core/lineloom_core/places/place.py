@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,9 @@ from lineloom_core.features._kernels import (
 )
 from lineloom_core.fusion import LineObservations, fuse
 from lineloom_core.geometry import Pose
+from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
 from lineloom_core.matching.local_map import Cloud, LocalMap
+from lineloom_core.places import _kernels
 
 _CORNER_REACH = 0.15
 
@@ -59,6 +62,12 @@ class Place:
     angle_increments: NDArray[np.float64]
     sweep_poses: NDArray[np.float64]
 
+    @cached_property
+    def own_conflict(self) -> float:
+        """Share of the place's own points in its own free space: clutter, people, drift inside."""
+        matched, conflict = count_points(self, self, Pose.identity())
+        return conflict / max(matched + conflict, 1.0)
+
     @staticmethod
     def of(id: int, track: int, anchor: int, glimpses: Sequence[Glimpse]) -> Place:
         """Fuse the glimpses of consecutive keyframes of one track."""
@@ -86,6 +95,21 @@ class Place:
             angle_increments=np.array([g.features.angle_increment for g in glimpses]),
             sweep_poses=np.array([g.T_anchor_laser.to_array() for g in glimpses]),
         )
+
+
+def count_points(
+    reference: Place, current: Place, T_reference_current: Pose
+) -> tuple[float, float]:
+    """Points (cells of 0.1 m) that both places saw, and those in the other's free space."""
+    counts = np.empty(4)
+    _kernels.judge_places(
+        reference.surface.points, reference.ranges, reference.angle_mins,
+        reference.angle_increments, reference.sweep_poses,
+        current.surface.points, current.ranges, current.angle_mins,
+        current.angle_increments, current.sweep_poses,
+        T_reference_current.to_array(), 1, TOLERANCE, TOLERANCE_SLOPE, counts,
+    )  # fmt: skip
+    return float(counts[0]), float(counts[1])
 
 
 def _surface_cloud(local_map: LocalMap) -> Cloud:

@@ -17,7 +17,7 @@ from lineloom_core.graph.observability import observe
 from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
 from lineloom_core.matching.local_map import Registration
 from lineloom_core.places import _kernels
-from lineloom_core.places.place import Place
+from lineloom_core.places.place import Place, count_points
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,8 @@ class RecognitionConfig:
     """Thresholds of the verdict; lengths in metres, shares 0..1.
 
     half, cell: how far apart anchors may lie, and the cell of the translation vote.
-    most_conflict: share of judged points in the other's free space. least_matched: points (cells
+    most_conflict: share of judged points in the other's free space, beyond
+    what the places show against themselves. least_matched: points (cells
     of 0.1 m) that both saw. least_overlap: common length of lines. least_fit: share of the
     points inside both grids that lie on the other's surface. least_margin: by how much evidence
     the best hypothesis beats the best rival, as a share. least_information: smallest eigenvalue
@@ -84,6 +85,7 @@ def recognise(
     checks["evidence"] = evidence
     rival = _best_elsewhere(table, registered.pose, config)
     checks["margin"] = 1.0 - rival / evidence if evidence > 0.0 else 0.0
+    checks["own_conflict"] = reference.own_conflict + current.own_conflict
     reason = _objection(checks, config)
     return Recognition(
         plausible=reason == "",
@@ -144,21 +146,6 @@ def check_alignment(reference: Place, current: Place, registered: Registration) 
     }
 
 
-def count_points(
-    reference: Place, current: Place, T_reference_current: Pose
-) -> tuple[float, float]:
-    """Points (cells of 0.1 m) that both places saw, and those in the other's free space."""
-    counts = np.empty(4)
-    _kernels.judge_places(
-        reference.surface.points, reference.ranges, reference.angle_mins,
-        reference.angle_increments, reference.sweep_poses,
-        current.surface.points, current.ranges, current.angle_mins,
-        current.angle_increments, current.sweep_poses,
-        T_reference_current.to_array(), 1, TOLERANCE, TOLERANCE_SLOPE, counts,
-    )  # fmt: skip
-    return float(counts[0]), float(counts[1])
-
-
 def _best_elsewhere(
     table: NDArray[np.float64], pose: Pose, config: RecognitionConfig, slack: float = 0.0
 ) -> float:
@@ -179,7 +166,7 @@ def _objection(checks: dict[str, float], config: RecognitionConfig) -> str:
         return "too few points in common"
     if checks["overlap"] < config.least_overlap:
         return "too little common line length"
-    if checks["conflict_share"] > config.most_conflict:
+    if checks["conflict_share"] > config.most_conflict + checks["own_conflict"]:
         return "walls of one place stand in free space of the other"
     if checks["margin"] < config.least_margin:
         return "another hypothesis fits almost as well"
