@@ -33,9 +33,10 @@ class RealLog:
         if not self.log.is_file() or not self.reference.is_file():
             pytest.skip(f"no real data: {self.log.parent} is missing")
 
-    def read(self) -> list[Scan]:
-        """All scans without their odometry; `seq` is the row in the reference."""
-        return [replace(scan, odometry=None) for scan in read_carmen(self.log)]
+    def read(self, *, odometry: bool = False) -> list[Scan]:
+        """All scans, without their odometry unless asked; `seq` is the row in the reference."""
+        scans = list(read_carmen(self.log))
+        return scans if odometry else [replace(scan, odometry=None) for scan in scans]
 
     def check(self, seqs: NDArray[np.int64], poses: NDArray[np.float64]) -> None:
         """Assert that nearly all scans were placed, and rightly; poses in one frame, (n, 3)."""
