@@ -24,6 +24,13 @@ from lineloom_core.features._kernels import (
 )
 from lineloom_core.matching._proposal_kernels import wrap_angle
 
+ACROSS_FLOOR, ANGLE_FLOOR = 4e-5, 1e-5
+"""What no wall is straighter than: variances [m^2, rad^2] that keep long lines from ruling."""
+EDGE_VARIANCE = 0.0025
+"""Of a corner or a wall's end along the wall [m^2]."""
+LAST_ANGLE_GATE, LAST_DISTANCE_GATE = math.radians(3.0), 0.12
+"""What the gates shrink to."""
+
 
 @njit(cache=True)
 def solve3(A, b):  # type: ignore[no-untyped-def]
@@ -45,6 +52,67 @@ def solve3(A, b):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def huber(e, var, sigmas):  # type: ignore[no-untyped-def]
+    """Weight of a residual of that variance, less beyond so many standard deviations."""
+    if e * e <= sigmas * sigmas * var:
+        return 1.0 / var
+    return sigmas / (math.sqrt(var) * abs(e))
+
+
+@njit(cache=True)
+def line_residual(ref, cur, c, s, pose, angle_gate, distance_gate):  # type: ignore[no-untyped-def]
+    """One current line against one reference line at `pose`, c and s its cosine and sine.
+
+    Only the part that both share is evidence. Returns its length (0 where the lines do not lie on
+    each other), the distance across of its middle, the difference of directions, the middle of the
+    current line's shared part (x, y), and how far from either line's own middle it lies.
+    """
+    da = wrap_angle(ref[THETA] - cur[THETA] - pose[2])
+    if abs(da) > angle_gate:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    ax, ay = c * cur[X1] - s * cur[Y1] + pose[0], s * cur[X1] + c * cur[Y1] + pose[1]
+    bx, by = c * cur[X2] - s * cur[Y2] + pose[0], s * cur[X2] + c * cur[Y2] + pose[1]
+    ux, uy = math.cos(ref[THETA]), math.sin(ref[THETA])
+    ea, eb = ux * ay - uy * ax - ref[OFFSET], ux * by - uy * bx - ref[OFFSET]
+    s1 = ux * ref[X1] + uy * ref[Y1]
+    s2 = s1 + ref[LENGTH]
+    ta, tb = ux * ax + uy * ay, ux * bx + uy * by
+    lo, hi = max(ta, s1), min(tb, s2)
+    shared = hi - lo
+    if tb - ta < 1e-6 or shared < 0.3 * min(ref[LENGTH], cur[LENGTH]):
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    middle = 0.5 * (lo + hi)
+    e = ea + (eb - ea) / (tb - ta) * (middle - ta)
+    if abs(e) > distance_gate:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    px = ux * middle - uy * (ref[OFFSET] + e)
+    py = uy * middle + ux * (ref[OFFSET] + e)
+    return shared, e, da, px, py, middle - 0.5 * (s1 + s2), middle - 0.5 * (ta + tb)
+
+
+@njit(cache=True)
+def weights_of(ref, cur, mr, mc):  # type: ignore[no-untyped-def]
+    """The variances that the refinement weighs a pair of lines by: across, direction."""
+    var = ref[VAR_OFFSET] + cur[VAR_OFFSET] + ACROSS_FLOOR
+    var += ref[VAR_THETA] * mr * mr + cur[VAR_THETA] * mc * mc
+    return var, ref[VAR_THETA] + cur[VAR_THETA] + ANGLE_FLOOR
+
+
+@njit(cache=True)
+def add_residual(H, g, jx, jy, jt, w, e):  # type: ignore[no-untyped-def]
+    """Add one weighted residual to the upper triangle of H and to g."""
+    H[0, 0] += w * jx * jx
+    H[0, 1] += w * jx * jy
+    H[0, 2] += w * jx * jt
+    H[1, 1] += w * jy * jy
+    H[1, 2] += w * jy * jt
+    H[2, 2] += w * jt * jt
+    g[0] -= w * jx * e
+    g[1] -= w * jy * e
+    g[2] -= w * jt * e
+
+
+@njit(cache=True)
 def accumulate_lines(  # type: ignore[no-untyped-def]
     ref, ref_ends, ref_edges, cur, cur_ends, cur_edges, pose, angle_gate, distance_gate, H, g
 ):
@@ -57,60 +125,21 @@ def accumulate_lines(  # type: ignore[no-untyped-def]
     tx, ty = pose[0], pose[1]
     total = 0.0
     for j in range(cur.shape[0]):
-        ax, ay = c * cur[j, X1] - s * cur[j, Y1] + tx, s * cur[j, X1] + c * cur[j, Y1] + ty
-        bx, by = c * cur[j, X2] - s * cur[j, Y2] + tx, s * cur[j, X2] + c * cur[j, Y2] + ty
-        theta = cur[j, THETA] + pose[2]
         for i in range(ref.shape[0]):
-            da = wrap_angle(ref[i, THETA] - theta)
-            if abs(da) > angle_gate:
-                continue
-            ux, uy = math.cos(ref[i, THETA]), math.sin(ref[i, THETA])
-            nx, ny = -uy, ux
-            ea, eb = nx * ax + ny * ay - ref[i, OFFSET], nx * bx + ny * by - ref[i, OFFSET]
-            # Clip the current segment to the reference one: only the shared part is evidence.
-            s1 = ux * ref[i, X1] + uy * ref[i, Y1]
-            s2 = s1 + ref[i, LENGTH]
-            ta, tb = ux * ax + uy * ay, ux * bx + uy * by
-            if tb - ta < 1e-6:
-                continue
-            lo, hi = max(ta, s1), min(tb, s2)
-            shared = hi - lo
-            if shared < 0.3 * min(ref[i, LENGTH], cur[j, LENGTH]):
-                continue
-            slope = (eb - ea) / (tb - ta)
-            middle = 0.5 * (lo + hi)
-            e = ea + slope * (middle - ta)
-            if abs(e) > distance_gate:
+            shared, e, da, px, py, mr, mc = line_residual(
+                ref[i], cur[j], c, s, pose, angle_gate, distance_gate
+            )
+            if shared <= 0.0:
                 continue
             total += shared
+            ux, uy = math.cos(ref[i, THETA]), math.sin(ref[i, THETA])
+            nx, ny = -uy, ux
             # The middle of the shared part, across the line.
-            px, py = (
-                ux * middle + nx * (ref[i, OFFSET] + e),
-                uy * middle + ny * (ref[i, OFFSET] + e),
-            )
-            mr = middle - 0.5 * (s1 + s2)
-            mc = middle - 0.5 * (ta + tb)
-            var = (ref[i, VAR_OFFSET] + cur[j, VAR_OFFSET] + 4e-5
-                   + ref[i, VAR_THETA] * mr * mr + cur[j, VAR_THETA] * mc * mc)  # fmt: skip
-            sigma = math.sqrt(var)
-            w = 1.0 / var
-            if abs(e) > 3.0 * sigma:
-                w *= 3.0 * sigma / abs(e)
+            var, var_angle = weights_of(ref[i], cur[j], mr, mc)
             j2 = -nx * (py - ty) + ny * (px - tx)
-            H[0, 0] += w * nx * nx
-            H[0, 1] += w * nx * ny
-            H[0, 2] += w * nx * j2
-            H[1, 1] += w * ny * ny
-            H[1, 2] += w * ny * j2
-            H[2, 2] += w * j2 * j2
-            g[0] -= w * nx * e
-            g[1] -= w * ny * e
-            g[2] -= w * j2 * e
+            add_residual(H, g, nx, ny, j2, huber(e, var, 3.0), e)
             # Direction.
-            var = ref[i, VAR_THETA] + cur[j, VAR_THETA] + 1e-5
-            w = 1.0 / var
-            if da * da > 9.0 * var:
-                w *= 3.0 * math.sqrt(var) / abs(da)
+            w = huber(da, var_angle, 3.0)
             H[2, 2] += w
             g[2] += w * da
             # End points: a corner seen in both scans fixes the slide along the line.
@@ -120,22 +149,9 @@ def accumulate_lines(  # type: ignore[no-untyped-def]
                 qx = c * cur_edges[j, side, 0] - s * cur_edges[j, side, 1]
                 qy = s * cur_edges[j, side, 0] + c * cur_edges[j, side, 1]
                 e = ux * (qx + tx - ref_edges[i, side, 0]) + uy * (qy + ty - ref_edges[i, side, 1])
-                if abs(e) > distance_gate:
-                    continue
-                var = 0.0025
-                w = 1.0 / var
-                if e * e > 4.0 * var:
-                    w *= 2.0 * math.sqrt(var) / abs(e)
-                j2 = -ux * qy + uy * qx
-                H[0, 0] += w * ux * ux
-                H[0, 1] += w * ux * uy
-                H[0, 2] += w * ux * j2
-                H[1, 1] += w * uy * uy
-                H[1, 2] += w * uy * j2
-                H[2, 2] += w * j2 * j2
-                g[0] -= w * ux * e
-                g[1] -= w * uy * e
-                g[2] -= w * j2 * e
+                if abs(e) <= distance_gate:
+                    w = huber(e, EDGE_VARIANCE, 2.0)
+                    add_residual(H, g, ux, uy, -ux * qy + uy * qx, w, e)
     H[1, 0], H[2, 0], H[2, 1] = H[0, 1], H[0, 2], H[1, 2]
     return total
 
@@ -166,6 +182,6 @@ def refine(  # type: ignore[no-untyped-def]
         pose[0] += d[0]
         pose[1] += d[1]
         pose[2] = wrap_angle(pose[2] + d[2])
-        angle_gate = max(angle_gate * 0.7, math.radians(3.0))
-        distance_gate = max(distance_gate * 0.7, 0.12)
+        angle_gate = max(angle_gate * 0.7, LAST_ANGLE_GATE)
+        distance_gate = max(distance_gate * 0.7, LAST_DISTANCE_GATE)
     return total

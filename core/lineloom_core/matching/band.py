@@ -28,7 +28,6 @@ ITERATIONS = 4
 LEAST_WEIGHT = 2.0
 LEAST_MATCHED = 2.5
 MOST_CONFLICT = 0.12
-SIGMAS = (10.0, 0.06, 0.02)  # m along, m across, rad
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,13 +55,6 @@ class Band:
             and self.matched >= LEAST_MATCHED
             and self.conflict_share <= MOST_CONFLICT
         )
-
-    def covariance(self) -> NDArray[np.float64]:
-        """3x3 over x, y, theta in the reference frame: metres along, centimetres across."""
-        c, s = math.cos(self.direction), math.sin(self.direction)
-        R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        spread: NDArray[np.float64] = R @ np.diag(np.square(SIGMAS)) @ R.T
-        return spread
 
     def checks(self) -> dict[str, float]:
         """The figures behind `convincing`."""

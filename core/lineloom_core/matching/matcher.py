@@ -22,6 +22,7 @@ from lineloom_core.features import ExtractionConfig, ScanFeatures, extract_featu
 from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.matching import _kernels, _proposal_kernels
 from lineloom_core.matching.band import Band, as_band, band_hypotheses
+from lineloom_core.matching.covariance import pose_covariance
 from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
 from lineloom_core.matching.result import Alternative, LinePair, MatchResult, Verdict
 from lineloom_core.matching.score import probability
@@ -100,7 +101,9 @@ class LineMatcher:
         band = next((b for b in map(as_band, bands) if b.convincing), None)
         if band is None:
             return _unsure(result)
-        return _as_weak(result, band, line_pairs(reference, current, band.T_reference_current))
+        pose, along = band.T_reference_current, band.direction
+        covariance = pose_covariance(reference, current, pose, along)
+        return _as_weak(result, band, covariance, line_pairs(reference, current, pose))
 
     def _decide(
         self, reference: ScanFeatures, current: ScanFeatures, table: NDArray[np.float64]
@@ -120,7 +123,9 @@ class LineMatcher:
             verdict=verdict,
             T_reference_current=None if verdict == "none" else pose,
             weak_direction=weak_direction if verdict == "weak" else None,
-            covariance=None if verdict == "none" else _covariance(information),
+            covariance=None
+            if verdict == "none"
+            else pose_covariance(reference, current, pose, weak_direction),
             score=score,
             reason=reason,
             best=pose,
@@ -197,14 +202,19 @@ def _unsure(result: MatchResult) -> MatchResult:
     )
 
 
-def _as_weak(result: MatchResult, band: Band, pairs: tuple[LinePair, ...]) -> MatchResult:
+def _as_weak(
+    result: MatchResult,
+    band: Band,
+    covariance: NDArray[np.float64],
+    pairs: tuple[LinePair, ...],
+) -> MatchResult:
     """The same two parallel walls are an answer where no full pose convinces."""
     return replace(
         result,
         verdict="weak",
         T_reference_current=band.T_reference_current,
         weak_direction=band.direction,
-        covariance=band.covariance(),
+        covariance=covariance,
         reason="only parallel walls are shared: the position along them is not known",
         pairs=pairs,
         checks={**result.checks, **band.checks()},
@@ -236,12 +246,6 @@ def _weakness(information: NDArray[np.float64], weak_below: float) -> tuple[floa
         return None, least
     strong = 0.5 * math.atan2(2.0 * xy, xx - yy)  # the axis of the greater eigenvalue
     return (strong + 0.5 * math.pi) % math.pi, least
-
-
-def _covariance(information: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Inverse information; what nothing observes gets 10 m and 1 rad instead of infinity."""
-    floor = np.diag(np.array([0.01, 0.01, 1.0]))
-    return np.asarray(np.linalg.inv(information + floor), dtype=np.float64)
 
 
 def _checks(

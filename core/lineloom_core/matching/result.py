@@ -42,7 +42,8 @@ class MatchResult:
 
     verdict: "match" = right in full; "weak" = right up to a slide along `weak_direction` (rad in
     the reference frame); "ambiguous" = several places fit alike; "none" = no hypothesis stands,
-    see `reason`. covariance: 3x3 over x, y, theta in the reference frame. score in [0, 1]:
+    see `reason`. covariance: 3x3 over x, y, theta in the reference frame [m, rad]: true for right
+    answers (see `covariance`), along a weak direction some metres. score in [0, 1]:
     calibrated probability that the full pose of the best hypothesis is right, whatever the
     verdict. checks: each check's figure by name.
     """
