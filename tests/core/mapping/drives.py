@@ -12,7 +12,7 @@ from lineloom_core.features import extract_features
 from lineloom_core.geometry import Pose
 from lineloom_core.mapping.changes import Changes
 from lineloom_core.mapping.site_mapper import SiteMapper
-from lineloom_core.mapping.site_view import SiteView, TrajectoryView
+from lineloom_core.mapping.site_view import SiteView
 from lineloom_core.mapping.tracker import Tracked, Tracker
 from lineloom_core.matching.local_map import Cloud
 from lineloom_core.scan import Mount, Scan
@@ -109,22 +109,6 @@ def component_error(
                 estimate.append(trajectory.poses[i])
                 true.append(truth[robot, trajectory.session[i], int(trajectory.seq[i])])
     return trajectory_error(np.array(estimate), np.array(true))
-
-
-def same_trajectories(a: SiteView, b: SiteView) -> bool:
-    """Whether two views hold the same trajectories, bit for bit."""
-    return a.trajectories.keys() == b.trajectories.keys() and all(
-        _same_trajectory(a.trajectories[r], b.trajectories[r]) for r in a.trajectories
-    )
-
-
-def _same_trajectory(a: TrajectoryView, b: TrajectoryView) -> bool:
-    return (
-        (a.session, a.component) == (b.session, b.component)
-        and a.poses.tobytes() == b.poses.tobytes()
-        and a.seq.tobytes() == b.seq.tobytes()
-        and a.stamp.tobytes() == b.stamp.tobytes()
-    )
 
 
 def fingerprint(view: SiteView) -> tuple[object, ...]:
