@@ -11,7 +11,7 @@ from lineloom_core.matching import _free_space_kernels, _proposal_kernels
 from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
 from lineloom_core.places import Place
 from lineloom_core.places import _kernels as fast
-from lineloom_core.places.recognition import count_points
+from lineloom_core.places.place import count_points
 
 from tests.core.places import slow_twins as slow
 from tests.core.places.conftest import Stretch
