@@ -101,7 +101,7 @@ def test_the_beam_that_looks_at_a_point(angle_min: float, increment: float) -> N
 
 def sweep_with_holes(beams: int, increment: float) -> tuple[Floats, float, float]:
     rng = np.random.default_rng(8)
-    ranges = 3.0 + np.repeat(rng.choice([0.0, 0.3, 2.0], beams // 10 + 1), 10)[:beams]
+    ranges = 3.0 + np.repeat(rng.choice([0.0, 0.3, 0.7, 2.0], beams // 10 + 1), 10)[:beams]
     ranges = ranges + np.cumsum(rng.normal(0.0, 0.02, beams))
     ranges[rng.random(beams) < 0.1] = np.nan
     ranges[rng.random(beams) < 0.1] = np.inf
