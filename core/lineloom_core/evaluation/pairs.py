@@ -132,15 +132,14 @@ def score_pairs(pairs: Sequence[Pair], results: Sequence[MatchResult]) -> PairSc
         chosen = [i for i, p in enumerate(pairs) if p.tier == tier]
         if chosen:
             tiers[tier] = _tier_score([(pairs[i], results[i], bool(right[i])) for i in chosen])
-    answered = np.array([r.T_reference_current is not None for r in results], dtype=np.bool_)
     scores = np.array([r.score for r in results], dtype=np.float64)
     to_find = sum(p.tier != "neg" for p in pairs)
     wrong = sum(t.confidently_wrong * t.n for t in tiers.values())
     return PairScore(
         tiers=tiers,
         confidently_wrong=wrong / len(pairs) if pairs else 0.0,
-        recall_at_1_percent=recall_at(scores[answered], right[answered], to_find, 0.01),
-        recall_at_zero=recall_at(scores[answered], right[answered], to_find, 0.0),
+        recall_at_1_percent=recall_at(scores, right, to_find, 0.01),
+        recall_at_zero=recall_at(scores, right, to_find, 0.0),
     )
 
 
