@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +93,7 @@ def test_figures_by_group_count_the_best_hypothesis() -> None:
 
 
 def test_guesses_are_given_only_where_the_row_says_so() -> None:
+    before = threads_may_run_on()
     rows, _ = bench(row("near"), row("mid"), row("neg"))
     identity, guess, missing = rows
     assert (identity.start, guess.start) == ("identity", "guess")
@@ -99,9 +102,14 @@ def test_guesses_are_given_only_where_the_row_says_so() -> None:
     assert guess.figures["real"].groups["near"].n == 2
     assert guess.by_set["b"].groups["near"].n == 1
     assert missing.missing == "No module named 'absent'"
+    assert threads_may_run_on() == before
     blind = Contestant("blind", "default", chosen(["lineloom"])[0].make, ("guess",))
     with pytest.raises(TypeError, match="takes no guess"):
         run_pair_bench([blind], (BenchSet("a", "real", (row("near"),)),))
+
+
+def threads_may_run_on() -> set[int]:
+    return os.sched_getaffinity(0) if sys.platform == "linux" else set()
 
 
 def test_the_table_and_the_json_hold_every_row() -> None:

@@ -6,6 +6,8 @@ Rusu, N. Blodow and M. Beetz, "Fast point feature histograms (FPFH) for 3D regis
 How a flat scan is fed to it: the points as they are, at height 0, with normals that we estimate in
 the plane and tilt upwards. With normals in the plane a scan and its mirror image have the same
 histograms; tilted, they differ, and a match that flips the plane over does not fit.
+
+Seeded, but its thread pool repeats itself on one core only (see `pair_bench`).
 """
 
 from __future__ import annotations
