@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from lineloom_core.features import ScanFeatures
 from lineloom_core.geometry import Pose
+from lineloom_core.graph import observe, project_out_weak
 from lineloom_core.matching.free_space import judge_sweeps
 from lineloom_core.matching.local_map import Cloud, LocalMap, Registration
 
@@ -42,6 +43,8 @@ class TrackerConfig:
     much of it is new. most_conflict: share of
     it that may lie where the keyframe saw free space. patience: unfit scans in a row before the
     track is given up. longest_gap: silence after which velocity means nothing.
+    prior_sigma [m, rad]: how firmly the prediction holds what little is observed. least_isotropy:
+    smaller over greater information on the position, under which the smaller counts as none.
     """
 
     memory: int = 8
@@ -53,6 +56,7 @@ class TrackerConfig:
     patience: int = 4
     longest_gap: float = 0.6
     prior_sigma: float = 0.1
+    least_isotropy: float = 0.001
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,11 +104,13 @@ class Tracker:
     ) -> Tracked:
         """Place the next scan; `odometry` is T_odom_laser where the robot has any."""
         if self._map is None:
-            self._accept(Pose.identity(), stamp, odometry)
+            self._accept(Pose.identity(), stamp, odometry, moved_to=Pose.identity())
             self._add_keyframe(features, cloud)
             return Tracked("first", self._pose, True, np.zeros((3, 3)), 1.0, 0.0)
         predictions = self._predict(stamp, odometry)
-        found = self._register(cloud, predictions, stamp - self._stamp)
+        found, held = self._register(cloud, predictions, stamp - self._stamp)
+        if odometry is not None and self._odometry is not None:
+            found = held  # wheels know the way along a plain corridor
         conflict = self._conflict(features, found.pose)
         config = self._config
         if found.fit < config.least_fit or conflict > config.most_conflict:
@@ -112,7 +118,7 @@ class Tracker:
             status: Status = "lost" if self._misses >= config.patience else "skipped"
             return Tracked(status, None, False, np.zeros((3, 3)), found.fit, conflict)
         self._misses = 0
-        self._accept(found.pose, stamp, odometry)
+        self._accept(found.pose, stamp, odometry, moved_to=held.pose)
         step = self._recent[-1][1].between(found.pose)
         is_keyframe = (
             math.hypot(step.x, step.y) > config.keyframe_distance
@@ -121,7 +127,7 @@ class Tracker:
         )
         if is_keyframe:
             self._add_keyframe(features, cloud)
-        return Tracked("tracked", found.pose, is_keyframe, _in_own_axes(found), found.fit, conflict)
+        return Tracked("tracked", found.pose, is_keyframe, _in_own_axes(held), found.fit, conflict)
 
     def _predict(self, stamp: float, odometry: Pose | None) -> list[Pose]:
         """Where the robot may be: same velocity, and what its wheels say."""
@@ -133,8 +139,10 @@ class Tracker:
             predictions.append(self._pose @ self._odometry.between(odometry))
         return predictions
 
-    def _register(self, cloud: Cloud, predictions: list[Pose], dt: float) -> Registration:
-        """Search around each prediction, register the best find of all."""
+    def _register(
+        self, cloud: Cloud, predictions: list[Pose], dt: float
+    ) -> tuple[Registration, Registration]:
+        """Register the best find around any prediction; the same, held where nothing observes."""
         assert self._map is not None
         gap = min(max(dt, 0.2), 1.5)
         best: tuple[Pose, float] | None = None
@@ -147,17 +155,19 @@ class Tracker:
                 best = pose, score
         assert best is not None
         hold = 1.0 / self._config.prior_sigma**2
-        return self._map.register(cloud, best[0], prior=(hold, hold, hold))
+        found = self._map.register(cloud, best[0], prior=(hold, hold, hold))
+        return found, _held_where_unseen(found, predictions[-1], self._config.least_isotropy)
 
     def _conflict(self, features: ScanFeatures, pose: Pose) -> float:
         assert self._keyframe_features is not None
         T_keyframe_laser = self._recent[-1][1].between(pose)
         return judge_sweeps(self._keyframe_features, features, T_keyframe_laser).conflict_share
 
-    def _accept(self, pose: Pose, stamp: float, odometry: Pose | None) -> None:
+    def _accept(self, pose: Pose, stamp: float, odometry: Pose | None, *, moved_to: Pose) -> None:
+        """Take a pose. Velocity is that to `moved_to`: a slide that noise chose must not go on."""
         dt = stamp - self._stamp
         if 0.01 < dt < 1.0:  # steps of zero or less occur in real logs
-            self._twist = self._pose.between(pose).to_array() / dt
+            self._twist = self._pose.between(moved_to).to_array() / dt
             self._twist_span = dt
         elif dt >= 1.0:
             self._twist = np.zeros(3)
@@ -167,6 +177,23 @@ class Tracker:
         self._recent.append((cloud, self._pose))
         self._keyframe_features = features
         self._map = LocalMap.build(reversed(self._recent))
+
+
+def _held_where_unseen(found: Registration, predicted: Pose, least: float) -> Registration:
+    """The same with the position along an unobserved direction as predicted.
+
+    Between two plain walls, noise alone would choose the slide, and momentum would keep it.
+    """
+    seen = observe(found.information)
+    if seen.lambda_min >= least * seen.lambda_max:
+        return found
+    xx, xy, yy = seen.translation[0, 0], seen.translation[0, 1], seen.translation[1, 1]
+    along = 0.5 * math.atan2(2.0 * xy, xx - yy) + 0.5 * math.pi
+    c, s = math.cos(along), math.sin(along)
+    slide = c * (predicted.x - found.pose.x) + s * (predicted.y - found.pose.y)
+    pose = Pose(found.pose.x + slide * c, found.pose.y + slide * s, found.pose.theta)
+    known = project_out_weak(found.information, weak_below=least * seen.lambda_max)
+    return replace(found, pose=pose, information=known)
 
 
 def _in_own_axes(found: Registration) -> NDArray[np.float64]:

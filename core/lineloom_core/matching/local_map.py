@@ -34,8 +34,10 @@ class Cloud:
         points = features.points
         ranges = np.sqrt(points[:, 0] ** 2 + points[:, 1] ** 2)
         weights = np.minimum(ranges * features.angle_increment / 0.05, 1.0)
+        normals = features.normals()
+        _kernels.line_normals(points, features.beams, features.lines, normals)
         sparse = points[_kernels.thin(points, 0.12, 90)]
-        return Cloud(points, features.normals(), weights, sparse)
+        return Cloud(points, normals, weights, sparse)
 
 
 @dataclass(frozen=True, eq=False)

@@ -151,14 +151,15 @@ def test_no_clock_throws_the_tracker_off(
     assert errors[:, 1].max() < 0.015
 
 
-def test_the_information_is_symmetric_positive_and_in_the_lasers_axes() -> None:
+def test_the_information_is_symmetric_semidefinite_and_in_the_lasers_axes() -> None:
     # A long plain corridor, ends out of sight: only the way along it is unknown.
     lidar = replace(scanner_360(), range_max=8.0)
     world, drive = rectangle(60.0, 2.4), legs(Pose(30.0, 1.2, 0.0), (0.0, 0.6))
     found = follow(scans_of(world, drive, lidar=lidar))
     for step in found[1:]:
         np.testing.assert_allclose(step.information, step.information.T, rtol=1e-9)
-        assert np.linalg.eigvalsh(step.information).min() > 0.0
+        eigenvalues = np.linalg.eigvalsh(step.information)
+        assert eigenvalues.min() > -1e-9 * eigenvalues.max()  # zero along what nothing observes
     assert found[-1].pose is not None
     along = np.array([math.cos(-found[-1].pose.theta), math.sin(-found[-1].pose.theta)])
     across = np.array([-along[1], along[0]])
