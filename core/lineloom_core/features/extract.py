@@ -1,15 +1,18 @@
-"""Line segments, end points and edges of one scan (thesis chapter 3)."""
+"""Line segments, end points, edges (thesis chapter 3) and circles of one scan."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lineloom_core.features import _kernels
+from lineloom_core.features import _circle_kernels, _kernels
 from lineloom_core.scan import Scan
+
+CHORD_REACH = 0.09
+"""How far off a circle [m] the ends and middle of its chords lie: the split threshold and noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +24,7 @@ class ExtractionConfig:
     are merged when their joint maximum deviation stays below merge_factor * split.
     max_gap_beams: beams without a return that do not break a surface. max_gap: how far apart two
     collinear runs may lie to be merged all the same. corner_reach: how far an angle
-    edge may lie from the ends of its two lines.
+    edge may lie from the ends of its two lines. min_circle_points: fewest points of a circle.
     """
 
     sigma: float = 0.015
@@ -33,6 +36,7 @@ class ExtractionConfig:
     max_gap_beams: int = 6
     max_gap: float = 0.3
     corner_reach: float = 0.35
+    min_circle_points: int = 7
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +49,9 @@ class ScanFeatures:
         side lies on the left and directions span the full 360 degrees (§4.3).
     ends: (n, 2) INTERIOR, EDGE or UNKNOWN for start and end (§3.2). edges: (n, 2, 2) the corner
         points that go with EDGE ends (§3.3), elsewhere the bare end points.
+    circles: (k, 12): centre x, y and radius [m], variances of the centre xx, xy, yy and of the
+        radius [m^2], sense (+1 a column seen from outside, -1 a round room from inside), arc that
+        is seen [rad], number of points, first and last beam. Their chords are in `lines` too.
     points: (m, 2) finite returns [m], surface by surface; beams: (m,) their indices;
         breaks: (m,) True at the last point of each surface.
     ranges, angle_min, angle_increment: the sweep itself, counter-clockwise, for free-space checks.
@@ -53,6 +60,7 @@ class ScanFeatures:
     lines: NDArray[np.float64]
     ends: NDArray[np.int64]
     edges: NDArray[np.float64]
+    circles: NDArray[np.float64]
     points: NDArray[np.float64]
     beams: NDArray[np.int64]
     breaks: NDArray[np.bool_]
@@ -62,6 +70,16 @@ class ScanFeatures:
 
     def __len__(self) -> int:
         return int(self.lines.shape[0])
+
+    def straight(self) -> ScanFeatures:
+        """These features without the lines that are chords of a circle; the same if there is none.
+
+        A chord lies where the split happened to fall: seen from elsewhere it is another one.
+        """
+        if len(self.circles) == 0:
+            return self
+        kept = ~_circle_kernels.chords(self.lines, self.circles, CHORD_REACH)
+        return replace(self, lines=self.lines[kept], ends=self.ends[kept], edges=self.edges[kept])
 
     def normals(self) -> NDArray[np.float64]:
         """Unit normals of the points towards the free side, (m, 2); zeros where there is none."""
@@ -90,10 +108,14 @@ def extract_features(
         config.max_gap,
         config.corner_reach,
     )
+    circles = _circle_kernels.find_circles(
+        points, beams, breaks, lines, len(scan.ranges), config.sigma, config.min_circle_points
+    )
     return ScanFeatures(
         lines=lines,
         ends=ends,
         edges=edges,
+        circles=circles,
         points=points,
         beams=beams,
         breaks=breaks,

@@ -22,6 +22,7 @@ from lineloom_core.features._kernels import (
     Y1,
     Y2,
 )
+from lineloom_core.matching._circle_match_kernels import accumulate_centre_noise
 from lineloom_core.matching._refinement_kernels import (
     EDGE_VARIANCE,
     huber,
@@ -209,13 +210,15 @@ def add_squares(G, noise, M):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def scan_noise(  # type: ignore[no-untyped-def]
-    ref, ref_ends, ref_edges, ref_points, ref_beams, ref_turn, ref_spacing,
-    cur, cur_ends, cur_edges, cur_points, cur_beams, cur_turn, cur_spacing,
+    ref, ref_ends, ref_edges, ref_circles, ref_points, ref_beams, ref_turn, ref_spacing,
+    cur, cur_ends, cur_edges, cur_circles, cur_points, cur_beams, cur_turn, cur_spacing,
     pose, angle_gate, distance_gate, H, M,
 ):  # fmt: skip
-    """`accumulate_noise` with the noise that the lines' own points show; (squares, number)."""
-    return accumulate_noise(
+    """`accumulate_noise` with the noise that the lines' own points show, and that of circles."""
+    squares, used = accumulate_noise(
         ref, ref_ends, ref_edges, line_noise(ref, ref_points, ref_beams, ref_turn), ref_spacing,
         cur, cur_ends, cur_edges, line_noise(cur, cur_points, cur_beams, cur_turn), cur_spacing,
         pose, angle_gate, distance_gate, H, M,
     )  # fmt: skip
+    more, others = accumulate_centre_noise(ref_circles, cur_circles, pose, distance_gate, H, M)
+    return squares + more, used + others

@@ -1,4 +1,4 @@
-"""Numba kernels of the matcher's step 4: Gauss-Newton on lines, directions and corners.
+"""Numba kernels of the matcher's step 4: Gauss-Newton on lines, corners and centres of circles.
 
 Slow twins: tests/core/matching/slow_twins.py.
 """
@@ -10,6 +10,7 @@ import math
 import numpy as np
 from numba import njit
 
+from lineloom_core.features._circle_kernels import CIRCLE_COLUMNS
 from lineloom_core.features._kernels import (
     EDGE,
     LENGTH,
@@ -22,6 +23,7 @@ from lineloom_core.features._kernels import (
     Y1,
     Y2,
 )
+from lineloom_core.matching._circle_match_kernels import accumulate_circles
 from lineloom_core.matching._proposal_kernels import wrap_angle
 
 ACROSS_FLOOR, ANGLE_FLOOR = 4e-5, 1e-5
@@ -157,10 +159,23 @@ def accumulate_lines(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def refine(  # type: ignore[no-untyped-def]
-    ref, ref_ends, ref_edges, cur, cur_ends, cur_edges, pose, H, iterations
+def refine_all(  # type: ignore[no-untyped-def]
+    ref,
+    ref_ends,
+    ref_edges,
+    ref_circles,
+    cur,
+    cur_ends,
+    cur_edges,
+    cur_circles,
+    pose,
+    H,
+    iterations,
 ):
-    """Step 4: Gauss-Newton on lines, shrinking gates. Moves `pose`, fills H; returns overlap."""
+    """Step 4: Gauss-Newton, shrinking gates. Moves `pose`, fills H; returns the overlap.
+
+    The overlap is in metres of line and of arc.
+    """
     angle_gate, distance_gate = math.radians(7.0), 0.25
     total = 0.0
     g = np.zeros(3)
@@ -171,6 +186,8 @@ def refine(  # type: ignore[no-untyped-def]
             ref, ref_ends, ref_edges, cur, cur_ends, cur_edges,
             pose, angle_gate, distance_gate, H, g,
         )  # fmt: skip
+        if ref_circles.shape[0] > 0 and cur_circles.shape[0] > 0:
+            total += accumulate_circles(ref_circles, cur_circles, pose, distance_gate, H, g)
         if it == iterations or total == 0.0:
             break
         A = H.copy()
@@ -185,3 +202,14 @@ def refine(  # type: ignore[no-untyped-def]
         angle_gate = max(angle_gate * 0.7, LAST_ANGLE_GATE)
         distance_gate = max(distance_gate * 0.7, LAST_DISTANCE_GATE)
     return total
+
+
+@njit(cache=True)
+def refine(  # type: ignore[no-untyped-def]
+    ref, ref_ends, ref_edges, cur, cur_ends, cur_edges, pose, H, iterations
+):
+    """`refine_all` on lines alone."""
+    none = np.empty((0, CIRCLE_COLUMNS))
+    return refine_all(
+        ref, ref_ends, ref_edges, none, cur, cur_ends, cur_edges, none, pose, H, iterations
+    )

@@ -41,8 +41,8 @@ def pose_covariance(
     H, M = np.zeros((3, 3)), np.zeros((3, 3))
     r, c = reference, current
     squares, used = _kernels.scan_noise(
-        r.lines, r.ends, r.edges, r.points, r.beams, len(r.ranges), r.angle_increment,
-        c.lines, c.ends, c.edges, c.points, c.beams, len(c.ranges), c.angle_increment,
+        r.lines, r.ends, r.edges, r.circles, r.points, r.beams, len(r.ranges), r.angle_increment,
+        c.lines, c.ends, c.edges, c.circles, c.points, c.beams, len(c.ranges), c.angle_increment,
         pose.to_array(), LAST_ANGLE_GATE, LAST_DISTANCE_GATE, H, M,
     )  # fmt: skip
     inverse = np.linalg.inv(H + UNSEEN)

@@ -3,6 +3,8 @@
 Steps: 1-3. rotations by the histogram of direction differences, translations by votes of line
 pairs, ranking by explained length; 4. refinement; 5. free space both ways; 6. observability;
 7. uniqueness; 8. calibrated score. Steps 1 to 5 run in one kernel (`_kernels.match_sweeps`).
+Columns and round rooms take part in steps 1 to 4 where both scans show them: centres coincide, and
+their distances to lines and to each other name rotations (`_circle_match_kernels`).
 Where no full pose convinces, two scans of one corridor may still share its walls (`band`).
 
 Beyond the thesis (chapters 4 and 5): directions are compared first and translations are voted
@@ -21,6 +23,7 @@ from numpy.typing import NDArray
 from lineloom_core.features import ExtractionConfig, ScanFeatures, extract_features
 from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.matching import _kernels, _proposal_kernels
+from lineloom_core.matching._circle_match_kernels import circle_pairs
 from lineloom_core.matching.band import Band, as_band, band_hypotheses
 from lineloom_core.matching.covariance import pose_covariance
 from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
@@ -39,7 +42,8 @@ class MatcherConfig:
     cells, cell, half: translation cells kept per rotation, their size, greatest translation.
     pair_limit: line pairs per rotation. reach: how far off a line explains another before
     refinement. coarse_keep, fine_keep: hypotheses that see the coarse and the full free-space
-    check. weak_below: information [1/m^2] under which a direction is weak. rival_distance,
+    check. weak_below: information [1/m^2] under which a direction is weak; turn_below: the same
+    of the rotation [1/rad^2]. per_circle: rotations tried per pair of circles. rival_distance,
     rival_angle: what counts as another place. least_margin: lead over the rival. most_conflict,
     least_evidence: what a hypothesis must show to be one.
     least_score: how sure a "match" must be.
@@ -56,6 +60,8 @@ class MatcherConfig:
     fine_keep: int = 8
     iterations: int = 4
     weak_below: float = 300.0
+    turn_below: float = 400.0
+    per_circle: int = 4
     rival_distance: float = 0.3
     rival_angle: float = 0.15
     least_margin: float = 0.15
@@ -86,8 +92,17 @@ class LineMatcher:
 
     def match_prepared(self, reference: ScanFeatures, current: ScanFeatures) -> MatchResult:
         """Match features that have been extracted already."""
-        if len(reference) < 2 or len(current) < 2:
-            return _none("fewer than two line segments in a scan")
+        r, c = _comparable(reference, current)
+        result = self._match(r, c)
+        pose = result.T_reference_current or result.best
+        if (r is reference and c is current) or pose is None:
+            return result
+        return replace(result, pairs=line_pairs(reference, current, pose))
+
+    def _match(self, reference: ScanFeatures, current: ScanFeatures) -> MatchResult:
+        """Full poses first; where none convinces, the parallel walls that both saw."""
+        if min(_primitives(reference), _primitives(current)) < 2:
+            return _none("fewer than two line segments in a scan, and no circle")
         table = self._hypotheses(reference, current)
         result = self._decide(reference, current, table)
         if result.verdict != "none":
@@ -114,9 +129,12 @@ class LineMatcher:
         best = table[0]
         pose = Pose.from_array(best[:3])
         information = _information(best)
+        turn = _turn_information(information)
         weak_direction, lambda_min = _weakness(information, self.config.weak_below)
+        if turn < self.config.turn_below:
+            weak_direction = None  # it turns, so that no straight slide describes it
         rivals = self._rivals(table, pose, weak_direction)
-        checks = _checks(best, rivals, lambda_min)
+        checks = {**_checks(best, rivals, lambda_min), "turn_information": turn}
         score = probability(checks)
         verdict, reason = self._verdict(checks, score, weak_direction)
         return MatchResult(
@@ -138,11 +156,22 @@ class LineMatcher:
 
     def _hypotheses(self, r: ScanFeatures, c: ScanFeatures) -> NDArray[np.float64]:
         k = self.config
-        table: NDArray[np.float64] = _kernels.match_sweeps(
-            r.lines, r.ends, r.edges, r.points, r.ranges, r.angle_min, r.angle_increment,
-            c.lines, c.ends, c.edges, c.points, c.ranges, c.angle_min, c.angle_increment,
+        limits = (
             k.rotations, k.cells, k.least_share, k.pair_limit, k.cell, k.half, k.reach,
             k.coarse_keep, k.fine_keep, k.iterations, TOLERANCE, TOLERANCE_SLOPE,
+        )  # fmt: skip
+        table: NDArray[np.float64]
+        if len(r.circles) and len(c.circles):
+            table = _kernels.match_round_sweeps(
+                r.lines, r.ends, r.edges, r.circles,
+                r.points, r.ranges, r.angle_min, r.angle_increment,
+                c.lines, c.ends, c.edges, c.circles,
+                c.points, c.ranges, c.angle_min, c.angle_increment, *limits, k.per_circle,
+            )  # fmt: skip
+            return table
+        table = _kernels.match_sweeps(
+            r.lines, r.ends, r.edges, r.points, r.ranges, r.angle_min, r.angle_increment,
+            c.lines, c.ends, c.edges, c.points, c.ranges, c.angle_min, c.angle_increment, *limits,
         )  # fmt: skip
         return table
 
@@ -171,6 +200,8 @@ class LineMatcher:
         if checks["conflict_share"] > config.most_conflict:
             share = 100.0 * checks["conflict_share"]
             return "none", f"{share:.0f} % of what both saw contradicts the best hypothesis"
+        if checks["turn_information"] < config.turn_below:
+            return "ambiguous", "nothing seen by both fixes the rotation about what is round"
         if checks["margin"] < config.least_margin:
             return "ambiguous", "another hypothesis fits almost as well"
         if weak_direction is not None:
@@ -178,6 +209,18 @@ class LineMatcher:
         if score < config.least_score:
             return "none", f"the best hypothesis is right with a probability of only {score:.2f}"
         return "match", "all checks passed"
+
+
+def _comparable(r: ScanFeatures, c: ScanFeatures) -> tuple[ScanFeatures, ScanFeatures]:
+    """Where both show a circle that may be one, it stands for its chords; else lines alone."""
+    if len(r.circles) and len(c.circles) and len(circle_pairs(r.circles, c.circles)):
+        return r.straight(), c.straight()
+    return r, c
+
+
+def _primitives(f: ScanFeatures) -> int:
+    """How much a scan has to match: a circle is worth two lines, which fix a point as well."""
+    return len(f) + 2 * len(f.circles)
 
 
 def _by_evidence(table: NDArray[np.float64], bands: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -246,6 +289,14 @@ def _weakness(information: NDArray[np.float64], weak_below: float) -> tuple[floa
         return None, least
     strong = 0.5 * math.atan2(2.0 * xy, xx - yy)  # the axis of the greater eigenvalue
     return (strong + 0.5 * math.pi) % math.pi, least
+
+
+def _turn_information(information: NDArray[np.float64]) -> float:
+    """Information [1/rad^2] of the rotation while the translation is not known."""
+    (a, b, c), (_, d, e), (_, _, f) = information.tolist()
+    a, d = a + 0.01, d + 0.01  # where nothing fixes a translation it says nothing of the rotation
+    det = a * d - b * b
+    return float(f - (d * c * c - 2.0 * b * c * e + a * e * e) / det)
 
 
 def _checks(

@@ -21,6 +21,7 @@ from lineloom_core.simulation.odometry import DriftingOdometry
 from lineloom_core.simulation.office import office_floor
 from lineloom_core.simulation.planner import Planner
 from lineloom_core.simulation.robot import ROBOT_RADIUS_M, SimulatedRobot, SimulatedScan
+from lineloom_core.simulation.round_buildings import column_corridor, round_hall
 from lineloom_core.simulation.world import World
 
 __all__ = [
@@ -38,12 +39,14 @@ __all__ = [
     "SimulatedScan",
     "Walkers",
     "World",
+    "column_corridor",
     "corridors",
     "glazed",
     "long_corridor",
     "office_floor",
     "rectangle",
     "rooms",
+    "round_hall",
     "scanner_360",
     "sick_lms200",
     "world_named",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -147,10 +148,13 @@ def test_the_covariance_turns_with_the_reference(
     lines[:, :4] = R.transform(lines[:, :4].reshape(-1, 2)).reshape(-1, 4)
     lines[:, 4] += turn
     edges = R.transform(edges.reshape(-1, 2)).reshape(-1, 2, 2)
-    turned = ScanFeatures(
-        lines, ref.ends, edges, R.transform(ref.points), ref.beams, ref.breaks,
-        ref.ranges, ref.angle_min + turn, ref.angle_increment,
-    )  # fmt: skip
+    turned = replace(
+        ref,
+        lines=lines,
+        edges=edges,
+        points=R.transform(ref.points),
+        angle_min=ref.angle_min + turn,
+    )
     c, s = math.cos(turn), math.sin(turn)
     J = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     np.testing.assert_allclose(pose_covariance(turned, cur, R @ T), J @ C @ J.T, rtol=1e-6)
