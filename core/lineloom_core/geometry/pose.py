@@ -30,7 +30,7 @@ class Pose:
     @staticmethod
     def from_array(xyt: ArrayLike) -> Pose:
         """Build a pose from three numbers (x, y, theta)."""
-        x, y, theta = (float(v) for v in np.asarray(xyt, dtype=np.float64))
+        x, y, theta = np.asarray(xyt, dtype=np.float64).tolist()
         return Pose(x, y, theta)
 
     def to_array(self) -> NDArray[np.float64]:

@@ -18,7 +18,7 @@ from lineloom_core.matching._proposal_kernels import (
 )
 from lineloom_core.matching._refinement_kernels import refine
 
-COARSE_STEP = 6
+COARSE_STEP = 10
 
 
 @njit(cache=True)

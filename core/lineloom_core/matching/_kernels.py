@@ -14,6 +14,7 @@ from lineloom_core.matching._proposal_kernels import propose, wrap_angle
 from lineloom_core.matching._refinement_kernels import refine_all
 
 COARSE_STEP, FINE_STEP = 6, 2
+ALWAYS_COARSE, ALWAYS_FINE, WORTH_A_LOOK = 6, 3, 0.5
 
 
 @njit(cache=True)
@@ -27,17 +28,23 @@ def judge_proposals(  # type: ignore[no-untyped-def]
     counts = np.zeros(4)
     rank = np.empty(n)
     for k in range(n):
+        # Far behind the best in explained length: no look at free space makes up for that.
+        if k >= ALWAYS_COARSE and proposals[k, 3] < WORTH_A_LOOK * proposals[0, 3]:
+            n = k
+            break
         judge_pair(
             ref_points, ref_ranges, ref_min, ref_inc, cur_points, cur_ranges, cur_min, cur_inc,
             proposals[k, :3], COARSE_STEP, base + 0.15, slope + 0.01, counts,
         )  # fmt: skip
         rank[k] = proposals[k, 3] + COARSE_STEP * (counts[MATCHED] - 2.0 * counts[CONFLICT])
-    order = np.argsort(-rank, kind="mergesort")
+    order = np.argsort(-rank[:n], kind="mergesort")
     m = min(n, fine_keep)
     out = np.empty((m, 16))
     H = np.empty((3, 3))
     kept = 0
     for q in range(m):
+        if q >= ALWAYS_FINE and rank[order[q]] < WORTH_A_LOOK * rank[order[0]]:
+            break
         row = proposals[order[q]]
         pose = row[:3].copy()
         overlap = refine_all(

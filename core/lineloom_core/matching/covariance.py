@@ -47,7 +47,7 @@ def pose_covariance(
     )  # fmt: skip
     inverse = np.linalg.inv(H + UNSEEN)
     ratio = (squares + TRUSTED_COUNT) / (max(used - 3.0, 0.0) + TRUSTED_COUNT)
-    covariance = inverse @ (M * max(ratio, 1.0) + UNSEEN) @ inverse
+    covariance = inverse @ (M * ratio + UNSEEN) @ inverse
     covariance = 0.5 * (covariance + covariance.T)
     return covariance if weak_direction is None else _slid(covariance, weak_direction)
 

@@ -67,13 +67,18 @@ def slow_match(
     ref: ScanFeatures, cur: ScanFeatures, coarse: int, fine: int, apart: float = 0.08
 ) -> Floats:
     proposals = propose(*lines_of(ref), *lines_of(cur), *PROPOSING)[:coarse]
+    # The cascade: six always, then only what explains at least half of what the best explains.
+    proposals = [r for k, r in enumerate(proposals) if k < 6 or r[3] >= 0.5 * proposals[0][3]]
     wide = (TOLERANCE + 0.15, TOLERANCE_SLOPE + 0.01)
     ranks = []
     for row in proposals:
         counts = judged(ref, cur, row[:3], 6, wide)
         ranks.append(row[3] + counts[0] - 2.0 * counts[1])
     rows: list[Floats] = []
-    for k in sorted(range(len(ranks)), key=lambda k: -ranks[k])[:fine]:
+    order = sorted(range(len(ranks)), key=lambda k: -ranks[k])[:fine]
+    for q, k in enumerate(order):
+        if q >= 3 and ranks[k] < 0.5 * ranks[order[0]]:
+            break
         row = refined(ref, cur, proposals[k], 2)
         near = [r for r in rows if math.dist(r[:2], row[:2]) < apart]
         if row[9] > 0.0 and all(abs(wrap(r[2] - row[2])) >= 0.03 for r in near):
@@ -173,7 +178,7 @@ def slow_slide(ref: ScanFeatures, cur: ScanFeatures, band: Floats) -> tuple[Floa
     for k in range(-20, 21):
         x, y = Pose(0.0, 0.0, axis).transform([[0.3 * k, across]])[0]
         pose = np.array([x, y, phi])
-        counts = judged(ref, cur, pose, 6, (TOLERANCE + 0.05, TOLERANCE_SLOPE))
+        counts = judged(ref, cur, pose, 10, (TOLERANCE + 0.05, TOLERANCE_SLOPE))
         if counts[0] - 3.0 * counts[1] > best:
             best, winner = counts[0] - 3.0 * counts[1], pose
     return winner, best
