@@ -3,9 +3,9 @@
 The refinement is a weighted least-squares estimate x = H^-1 J'W e. Its weights W hold floors that
 keep long walls from ruling, so H^-1 is not its covariance. That is H^-1 (J'W S W J) H^-1, S being
 the covariance of what was measured: the noise of each line's own points, once per line however
-many residuals it takes part in, and of each corner and wall end. What is left is compared with
-what S says: where walls agree less than their noise allows (they bend, furniture was moved), the
-whole grows by that measured ratio.
+many residuals it takes part in, and of each corner, wall end and centre of a circle. What is left
+is compared with what S says: where walls agree less than their noise allows (they bend, furniture
+was moved), or better, the whole is scaled by that measured ratio.
 """
 
 from __future__ import annotations
