@@ -28,7 +28,17 @@ def examples(name: str) -> list[str]:
 
 
 def test_these_are_the_commands() -> None:
-    assert NAMES == ["bench", "demo", "map", "match", "replay", "serve", "simulate", "status"]
+    assert NAMES == [
+        "bench",
+        "demo",
+        "experiment",
+        "map",
+        "match",
+        "replay",
+        "serve",
+        "simulate",
+        "status",
+    ]
 
 
 @pytest.mark.parametrize("name", NAMES)

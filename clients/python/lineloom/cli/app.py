@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from lineloom.cli import bench, demo, match, replay, serve, simulate, status
+from lineloom.cli import bench, demo, experiment, match, replay, serve, simulate, status
 from lineloom.cli import map as map_command
 from lineloom.cli.console import note
 from lineloom.cli.failure import EXIT_CODES, explained
@@ -76,6 +76,7 @@ app.command("simulate")(simulate.simulate)
 app.command("map")(map_command.map_)
 app.command("match")(match.match)
 app.command("status")(status.status)
+app.command("experiment")(experiment.experiment)
 app.add_typer(bench.app, name="bench")
 
 

@@ -1,0 +1,142 @@
+"""`lineloom experiment`: the thesis's chapter 6 again, with its figures."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from lineloom.cli import options
+from lineloom.cli.console import note, out, print_json
+from lineloom.cli.failure import CommandError, Exit
+
+if TYPE_CHECKING:
+    from lineloom_core.experiments import Experiment, Report, Settings
+
+SHARED_DATA = Path(__file__).resolve().parents[5] / "shared" / "data"
+"""Where real data lies beside a checkout: `../shared/data` from the project's root."""
+
+
+class MatcherChoice(StrEnum):
+    """Who takes part."""
+
+    DEFAULT = "default"
+    THESIS = "thesis"
+    BOTH = "both"
+
+
+def experiment(
+    name: Annotated[
+        str | None,
+        typer.Argument(metavar="NAME", help="Which experiment, from --list; all for all of them."),
+    ] = None,
+    listing: Annotated[
+        bool, typer.Option("--list", help="Say which experiments there are, and stop.")
+    ] = False,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="DIR",
+            help="Write report (md, json) and figures (svg, png) into this folder.",
+        ),
+    ] = None,
+    seed: Annotated[
+        int, typer.Option(min=0, metavar="N", help="Seed of the sensor's noise and of samples.")
+    ] = 0,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A reduced run of a few seconds, to see that it works.")
+    ] = False,
+    matcher: Annotated[
+        MatcherChoice, typer.Option(help="Who takes part: one of the matchers, or both.")
+    ] = MatcherChoice.BOTH,
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Real data for real-scans; ../shared/data beside the checkout if left out.",
+        ),
+    ] = None,
+    json: options.Json = False,
+) -> None:
+    """Run an experiment of the thesis's chapter 6 again, and draw its figures.
+
+    The thesis's matcher and the default one side by side, on simulated scans of the sizes that
+    the text gives; the report says what differs from the printed figures, and why. The longest
+    run takes under a minute.
+
+    \b
+    Example:
+      lineloom experiment --list
+      lineloom experiment sparse-path --output out/sparse
+      lineloom experiment all --quick --seed 3 --matcher thesis --json
+    """
+    if listing:
+        _list()
+        return
+    settings = _settings(seed, quick, matcher, data)
+    reports = []
+    for chosen in _chosen(name):
+        report = _report(chosen, settings, name == "all")
+        if report is not None:
+            reports.append(report)
+            if output is not None:
+                _save(report, output)
+    if json:
+        documents = [report.to_json() for report in reports]
+        print_json(documents if name == "all" else documents[0])
+    else:
+        out.print("\n".join(r.to_markdown() for r in reports), markup=False, soft_wrap=True)
+
+
+def _settings(seed: int, quick: bool, matcher: MatcherChoice, data: Path | None) -> Settings:
+    try:
+        from lineloom_core.experiments import Settings
+    except ImportError:
+        raise CommandError(
+            "experiments need the core: `pip install lineloom-client[server]`"
+        ) from None
+    return Settings(seed=seed, quick=quick, matcher=matcher.value, data=data or SHARED_DATA)
+
+
+def _list() -> None:
+    _settings(0, True, MatcherChoice.BOTH, None)  # says what to install where the core is absent
+    from lineloom_core.experiments import EXPERIMENTS
+
+    width = max(len(e.name) for e in EXPERIMENTS)
+    out.print("\n".join(f"{e.name.ljust(width)}  {e.about}" for e in EXPERIMENTS), markup=False)
+
+
+def _chosen(name: str | None) -> tuple[Experiment, ...]:
+    from lineloom_core.experiments import EXPERIMENTS, UnknownExperimentError, experiment_named
+
+    if name is None:
+        raise CommandError("which experiment? `lineloom experiment --list` says", Exit.USAGE)
+    if name == "all":
+        return EXPERIMENTS
+    try:
+        return (experiment_named(name),)
+    except UnknownExperimentError as error:
+        raise CommandError(str(error), Exit.USAGE) from None
+
+
+def _report(chosen: Experiment, settings: Settings, one_of_many: bool) -> Report | None:
+    """Run one experiment; where its data is missing, all others still run."""
+    from lineloom_core.experiments import MissingDataError
+
+    note(f"{chosen.name}: {chosen.about} …")
+    try:
+        return chosen.run(settings)
+    except MissingDataError as error:
+        if not one_of_many:
+            raise CommandError(f"{error}. Name a folder with --data.") from None
+        note(f"skipped: {error}")
+        return None
+
+
+def _save(report: Report, folder: Path) -> None:
+    for path in report.save(folder):
+        note(f"wrote {path}")
