@@ -156,7 +156,7 @@ def _figure(runs: tuple[Timing, ...]) -> Figure:
     series.append(Series(f"printed mean, {PRINTED_MS} ms", ends, printed, "#66727f"))
     chart = Chart("time of a match alone", "percentile of the pairs", "ms", tuple(series))
     text = "Percentiles of the matching time beside the printed mean."
-    return Figure("timing", "§6.2: time per pair", text, ((chart,),), 400.0)
+    return Figure("timing", "Section 6.2: time per pair", text, ((chart,),), 400.0)
 
 
 def _differences(runs: tuple[Timing, ...]) -> tuple[str, ...]:

@@ -60,6 +60,7 @@ def test_the_sparse_path_prints_the_sizes_of_the_text() -> None:
     assert report.figures_of["default"]["right"] == report.figures_of["default"]["pairs"] == 22
     assert report.figures_of["thesis"]["right"] >= 11
     wrong = 22 - int(report.figures_of["thesis"]["right"])
+    assert "right, 2 seeds, least to most" in report.to_markdown()
     assert f"gets {wrong} of 22 pairs wrong" in report.to_markdown()
 
 
