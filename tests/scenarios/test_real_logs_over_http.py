@@ -30,9 +30,7 @@ def replay(log: RealLog, url: str, site: str) -> dict[str, Any]:
     return figures
 
 
-@pytest.mark.parametrize(
-    "log", [CSAIL, pytest.param(FR079, marks=pytest.mark.long)], ids=lambda log: log.name
-)
+@pytest.mark.parametrize("log", [CSAIL, FR079], ids=lambda log: log.name)
 def test_a_replayed_log_becomes_one_right_map(log: RealLog, tmp_path: Path) -> None:
     log.require()
     streams = load([log.log], split_into=3, odometry=False)

@@ -31,6 +31,8 @@ from lineloom_core.matching.result import Alternative, LinePair, MatchResult, Ve
 from lineloom_core.matching.score import probability
 from lineloom_core.scan import Scan
 
+Row = list[float]
+"""A hypothesis as `_kernels.match_sweeps` gives it."""
 X, Y, ANGLE, EXPLAINED, VOTES, MATCHED, CONFLICT, OCCLUDED, OUTSIDE, OVERLAP = range(10)
 
 
@@ -58,7 +60,7 @@ class MatcherConfig:
     reach: float = 0.25
     coarse_keep: int = 24
     fine_keep: int = 8
-    iterations: int = 4
+    iterations: int = 3
     weak_below: float = 300.0
     turn_below: float = 400.0
     per_circle: int = 4
@@ -126,14 +128,15 @@ class LineMatcher:
         """Steps 6 to 8 on a table of hypotheses, best first."""
         if len(table) == 0:
             return _none("no rotation and translation that two line pairs agree on")
-        best = table[0]
-        pose = Pose.from_array(best[:3])
-        information = _information(best)
+        rows: list[Row] = table.tolist()  # some fifteen numbers: plain floats are quicker here
+        best = rows[0]
+        pose = Pose(best[X], best[Y], best[ANGLE])
+        information = best[10:16]
         turn = _turn_information(information)
         weak_direction, lambda_min = _weakness(information, self.config.weak_below)
         if turn < self.config.turn_below:
             weak_direction = None  # it turns, so that no straight slide describes it
-        rivals = self._rivals(table, pose, weak_direction)
+        rivals = self._rivals(rows, pose, weak_direction)
         checks = {**_checks(best, rivals, lambda_min), "turn_information": turn}
         score = probability(checks)
         verdict, reason = self._verdict(checks, score, weak_direction)
@@ -150,7 +153,7 @@ class LineMatcher:
             pairs=line_pairs(reference, current, pose),
             checks=checks,
             alternatives=tuple(
-                Alternative(Pose.from_array(r[:3]), score * _ratio(r, best)) for r in rivals
+                Alternative(Pose(r[X], r[Y], r[ANGLE]), score * _ratio(r, best)) for r in rivals
             ),
         )
 
@@ -175,12 +178,10 @@ class LineMatcher:
         )  # fmt: skip
         return table
 
-    def _rivals(
-        self, table: NDArray[np.float64], best: Pose, weak_direction: float | None
-    ) -> list[NDArray[np.float64]]:
+    def _rivals(self, rows: list[Row], best: Pose, weak_direction: float | None) -> list[Row]:
         """Hypotheses that are another place; a slide along a weak direction is the same one."""
         found = []
-        for row in table[1:]:
+        for row in rows[1:]:
             dx, dy = row[X] - best.x, row[Y] - best.y
             if weak_direction is None:
                 apart = math.hypot(dx, dy)
@@ -226,7 +227,7 @@ def _primitives(f: ScanFeatures) -> int:
 def _by_evidence(table: NDArray[np.float64], bands: NDArray[np.float64]) -> NDArray[np.float64]:
     """Both kinds of hypotheses in one table, best first; equals keep their order."""
     joined = np.vstack([table, bands[:, : table.shape[1]]])
-    rank = np.array([_kernels.evidence(row) for row in joined])
+    rank = joined[:, OVERLAP] + joined[:, MATCHED] - 3.0 * joined[:, CONFLICT]
     ordered: NDArray[np.float64] = joined[np.argsort(-rank, kind="stable")]
     return ordered
 
@@ -272,16 +273,11 @@ def line_pairs(reference: ScanFeatures, current: ScanFeatures, pose: Pose) -> tu
     return tuple(LinePair(int(i), int(j), o, d, a) for i, j, o, d, a in rows.tolist())
 
 
-def _information(row: NDArray[np.float64]) -> NDArray[np.float64]:
-    a, b, c, d, e, f = row[10:16]
-    return np.array([[a, b, c], [b, d, e], [c, e, f]])
-
-
-def _weakness(information: NDArray[np.float64], weak_below: float) -> tuple[float | None, float]:
+def _weakness(information: Row, weak_below: float) -> tuple[float | None, float]:
     """Weak direction [rad, 0..pi) or None, and the least eigenvalue of the translation's Schur
-    complement [1/m^2].
+    complement [1/m^2]. information: the upper triangle, row by row.
     """
-    (a, b, c), (_, d, e), (_, _, f) = information.tolist()
+    a, b, c, d, e, f = information
     f = max(f, 1e-9)
     xx, xy, yy = a - c * c / f, b - c * e / f, d - e * e / f
     least = 0.5 * (xx + yy) - math.hypot(0.5 * (xx - yy), xy)
@@ -291,37 +287,39 @@ def _weakness(information: NDArray[np.float64], weak_below: float) -> tuple[floa
     return (strong + 0.5 * math.pi) % math.pi, least
 
 
-def _turn_information(information: NDArray[np.float64]) -> float:
+def _turn_information(information: Row) -> float:
     """Information [1/rad^2] of the rotation while the translation is not known."""
-    (a, b, c), (_, d, e), (_, _, f) = information.tolist()
+    a, b, c, d, e, f = information
     a, d = a + 0.01, d + 0.01  # where nothing fixes a translation it says nothing of the rotation
     det = a * d - b * b
-    return float(f - (d * c * c - 2.0 * b * c * e + a * e * e) / det)
+    return f - (d * c * c - 2.0 * b * c * e + a * e * e) / det
 
 
-def _checks(
-    best: NDArray[np.float64], rivals: list[NDArray[np.float64]], lambda_min: float
-) -> dict[str, float]:
-    evidence = float(_kernels.evidence(best))
-    rival = max((float(_kernels.evidence(r)) for r in rivals), default=0.0)
-    judged = max(float(best[MATCHED] + best[CONFLICT]), 1e-9)
-    seen = judged + float(best[OCCLUDED])
+def _evidence(row: Row) -> float:
+    """As `_kernels.evidence`: metres of wall that speak for a hypothesis."""
+    return row[OVERLAP] + row[MATCHED] - 3.0 * row[CONFLICT]
+
+
+def _checks(best: Row, rivals: list[Row], lambda_min: float) -> dict[str, float]:
+    evidence = _evidence(best)
+    rival = max((_evidence(r) for r in rivals), default=0.0)
+    judged = max(best[MATCHED] + best[CONFLICT], 1e-9)
     return {
         "evidence": evidence,
         "rival_evidence": max(rival, 0.0),
         "margin": 1.0 - max(rival, 0.0) / evidence if evidence > 0.0 else 0.0,
-        "overlap_m": float(best[OVERLAP]),
-        "matched_m": float(best[MATCHED]),
-        "conflict_m": float(best[CONFLICT]),
-        "conflict_share": float(best[CONFLICT]) / judged,
-        "matched_share": float(best[MATCHED]) / seen,
+        "overlap_m": best[OVERLAP],
+        "matched_m": best[MATCHED],
+        "conflict_m": best[CONFLICT],
+        "conflict_share": best[CONFLICT] / judged,
+        "matched_share": best[MATCHED] / (judged + best[OCCLUDED]),
         "information": lambda_min,
     }
 
 
-def _ratio(rival: NDArray[np.float64], best: NDArray[np.float64]) -> float:
-    top = float(_kernels.evidence(best))
-    return min(max(float(_kernels.evidence(rival)) / top, 0.0), 1.0) if top > 0.0 else 0.0
+def _ratio(rival: Row, best: Row) -> float:
+    top = _evidence(best)
+    return min(max(_evidence(rival) / top, 0.0), 1.0) if top > 0.0 else 0.0
 
 
 def _none(reason: str) -> MatchResult:
