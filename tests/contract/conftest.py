@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from lineloom_service.settings import Settings
 sys.path.insert(0, str(Path(__file__).parents[1] / "service"))
 
 BACKLOG_LIMIT = 500
+_NUMBERS = count()
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
@@ -79,3 +81,9 @@ def idle(client: httpx.AsyncClient) -> Callable[[str], Awaitable[dict[str, Any]]
         raise AssertionError(f"never idle: {answer}")
 
     return wait
+
+
+@pytest.fixture
+def site() -> str:
+    """A site that no other test uses."""
+    return f"site-{next(_NUMBERS)}"

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import gzip
-import json
 import math
 from array import array
-from collections.abc import Awaitable, Callable
-from itertools import count
 from typing import Any
 
 import httpx
@@ -19,40 +16,9 @@ from lineloom_core.scan import MAX_BEAMS
 from lineloom_service.service import Service
 from lineloom_service.store.codec import decode_scan
 
+from tests.contract.posting import MSGPACK, Idle, Make, as_problem, post_scans
+
 pytestmark = pytest.mark.asyncio(loop_scope="module")
-
-Make = Callable[..., dict[str, Any]]
-Idle = Callable[[str], Awaitable[dict[str, Any]]]
-_NUMBERS = count()
-
-JSON = {"Content-Type": "application/json"}
-MSGPACK = {"Content-Type": "application/msgpack"}
-
-
-@pytest.fixture
-def site() -> str:
-    """A site that no other test uses."""
-    return f"site-{next(_NUMBERS)}"
-
-
-async def _post(
-    client: httpx.AsyncClient, site: str, body: Any, headers: dict[str, str] | None = None
-) -> httpx.Response:
-    content = body if isinstance(body, bytes) else json.dumps(body).encode()
-    return await client.post(
-        f"/v1/sites/{site}/robots/r/scans", content=content, headers=headers or JSON
-    )
-
-
-def _problem(response: httpx.Response, status: int, slug: str) -> dict[str, Any]:
-    assert response.status_code == status, response.text
-    assert response.headers["content-type"] == "application/problem+json"
-    problem: dict[str, Any] = response.json()
-    assert problem["type"] == f"/problems/{slug}"
-    assert problem["status"] == status
-    assert problem["title"]
-    assert problem["detail"]
-    return problem
 
 
 async def _stored(service: Service, site: str) -> list[Any]:
@@ -65,7 +31,7 @@ async def _stored(service: Service, site: str) -> list[Any]:
 async def test_one_scan_is_taken_and_mapped(
     client: httpx.AsyncClient, site: str, make_scan: Make, idle: Idle
 ) -> None:
-    response = await _post(client, site, make_scan(0))
+    response = await post_scans(client, site, make_scan(0))
     assert response.status_code == 202
     assert response.json() == {"accepted": 1, "duplicates": 0, "rejected": [], "pending": 1}
     answer = await idle(site)
@@ -77,8 +43,8 @@ async def test_sending_again_is_harmless(
     client: httpx.AsyncClient, site: str, make_scan: Make, idle: Idle
 ) -> None:
     batch = {"scans": [make_scan(seq) for seq in range(5)]}
-    assert (await _post(client, site, batch)).json()["accepted"] == 5
-    again = (await _post(client, site, batch)).json()
+    assert (await post_scans(client, site, batch)).json()["accepted"] == 5
+    again = (await post_scans(client, site, batch)).json()
     assert (again["accepted"], again["duplicates"]) == (0, 5)
     assert (await idle(site))["version"] == 5
 
@@ -94,7 +60,7 @@ async def test_a_batch_takes_the_good_scans_and_lists_the_others(
         make_scan(4, seq=-4),
         make_scan(1),
     ]
-    response = await _post(client, site, {"scans": scans})
+    response = await post_scans(client, site, {"scans": scans})
     assert response.status_code == 202
     answer = response.json()
     assert answer["accepted"] == 2
@@ -114,7 +80,7 @@ async def test_a_batch_without_a_good_scan_is_refused_with_all_its_faults(
     client: httpx.AsyncClient, site: str, make_scan: Make
 ) -> None:
     body = {"scans": [make_scan(0, stamp="1.0"), make_scan(1, range_max=0.05)]}
-    problem = _problem(await _post(client, site, body), 422, "invalid-body")
+    problem = as_problem(await post_scans(client, site, body), 422, "invalid-body")
     assert [e["pointer"] for e in problem["errors"]] == ["/scans/0/stamp", "/scans/1/range_max"]
     assert (await client.get(f"/v1/sites/{site}")).status_code == 404
 
@@ -123,7 +89,7 @@ async def test_what_ranges_mean(
     client: httpx.AsyncClient, service: Service, site: str, make_scan: Make
 ) -> None:
     ranges = [1.5, None, "inf", "-inf", 30.0, 31, 0.05, 0.1]
-    assert (await _post(client, site, make_scan(0, ranges=ranges))).status_code == 202
+    assert (await post_scans(client, site, make_scan(0, ranges=ranges))).status_code == 202
     (scan,) = await _stored(service, site)
     expected = [1.5, math.nan, math.inf, -math.inf, math.inf, math.inf, -math.inf, 0.1]
     assert [repr(v) for v in scan.ranges.tolist()] == [repr(v) for v in expected]
@@ -140,7 +106,7 @@ async def test_only_no_returns_and_changing_beam_counts_are_fine(
         make_scan(4, stamp=4.0, angle_max=1.0),
         make_scan(5, intensities=[1, 2, 3]),
     ]
-    answer = (await _post(client, site, {"scans": scans})).json()
+    answer = (await post_scans(client, site, {"scans": scans})).json()
     assert (answer["accepted"], answer["rejected"]) == (6, [])
     assert (await idle(site))["scans"]["processed"] == 6
 
@@ -164,9 +130,9 @@ async def test_json_and_msgpack_carry_the_same_scans(
         )
     ]
     headers = {**MSGPACK, "Content-Encoding": "gzip"}
-    assert (await _post(client, site, wire.pack_json(scans))).json()["accepted"] == 2
+    assert (await post_scans(client, site, wire.pack_json(scans))).json()["accepted"] == 2
     packed = gzip.compress(wire.pack_msgpack(scans))
-    other = await _post(client, f"{site}-m", packed, headers)
+    other = await post_scans(client, f"{site}-m", packed, headers)
     assert other.json()["accepted"] == 2
     pairs = zip(await _stored(service, site), await _stored(service, f"{site}-m"), strict=True)
     for a, b in pairs:
@@ -179,19 +145,19 @@ async def test_msgpack_takes_packed_floats_and_nan(
 ) -> None:
     packed = array("f", [1.5, math.nan, math.inf, 2.0, 0.01]).tobytes()
     body = msgpack.packb({"scans": [make_scan(0, ranges=packed)]})
-    assert (await _post(client, site, body, MSGPACK)).status_code == 202
+    assert (await post_scans(client, site, body, MSGPACK)).status_code == 202
     (scan,) = await _stored(service, site)
     assert repr(scan.ranges.tolist()) == repr([1.5, math.nan, math.inf, 2.0, -math.inf])
     for ranges in (b"", b"123", b"\x00" * 4 * (MAX_BEAMS + 1), [b"1"], [msgpack.Timestamp(1)]):
         body = msgpack.packb(make_scan(1, ranges=ranges))
-        _problem(await _post(client, site, body, MSGPACK), 422, "invalid-body")
+        as_problem(await post_scans(client, site, body, MSGPACK), 422, "invalid-body")
 
 
 async def test_out_of_order_batches_are_mapped_in_order(
     client: httpx.AsyncClient, service: Service, site: str, make_scan: Make, idle: Idle
 ) -> None:
     for seqs in ([2, 1], [5, 3], [0], [4]):
-        await _post(client, site, {"scans": [make_scan(seq) for seq in seqs]})
+        await post_scans(client, site, {"scans": [make_scan(seq) for seq in seqs]})
     await idle(site)
     assert [scan.seq for scan in await _stored(service, site)] == [0, 1, 2, 3, 4, 5]
 
@@ -199,7 +165,7 @@ async def test_out_of_order_batches_are_mapped_in_order(
 async def test_held_scans_are_pending_and_in_time_mapped(
     client: httpx.AsyncClient, site: str, make_scan: Make, idle: Idle
 ) -> None:
-    answer = (await _post(client, site, {"scans": [make_scan(s) for s in (0, 2, 4)]})).json()
+    answer = (await post_scans(client, site, {"scans": [make_scan(s) for s in (0, 2, 4)]})).json()
     assert answer["accepted"] == 3
     await asyncio.sleep(0.1)
     now = (await client.get(f"/v1/sites/{site}")).json()
@@ -215,16 +181,16 @@ async def test_a_full_backlog_is_429_and_takes_nothing(
     client: httpx.AsyncClient, service: Service, site: str, make_scan: Make, idle: Idle
 ) -> None:
     first = {"scans": [make_scan(seq) for seq in range(1, 451)]}  # held: 0 is missing
-    assert (await _post(client, site, first)).status_code == 202
+    assert (await post_scans(client, site, first)).status_code == 202
     second = {"scans": [make_scan(seq) for seq in range(450, 550)]}
-    response = await _post(client, site, second)
-    _problem(response, 429, "backlog-full")
+    response = await post_scans(client, site, second)
+    as_problem(response, 429, "backlog-full")
     assert int(response.headers["retry-after"]) >= 1
     record = await service.store.site(site)
     assert record is not None
     assert record.accepted == 450
     await idle(site)
-    assert (await _post(client, site, second)).json()["accepted"] == 99
+    assert (await post_scans(client, site, second)).json()["accepted"] == 99
 
 
 async def test_every_allowed_name_works(client: httpx.AsyncClient, make_scan: Make) -> None:

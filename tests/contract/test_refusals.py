@@ -3,50 +3,17 @@
 from __future__ import annotations
 
 import gzip
-import json
 import math
-from collections.abc import AsyncIterator, Awaitable, Callable
-from itertools import count
+from collections.abc import AsyncIterator
 from typing import Any
 
 import httpx
 import pytest
 from lineloom_core.scan import MAX_BEAMS
 
+from tests.contract.posting import JSON, MSGPACK, Make, as_problem, post_scans
+
 pytestmark = pytest.mark.asyncio(loop_scope="module")
-
-Make = Callable[..., dict[str, Any]]
-Idle = Callable[[str], Awaitable[dict[str, Any]]]
-_NUMBERS = count()
-
-JSON = {"Content-Type": "application/json"}
-MSGPACK = {"Content-Type": "application/msgpack"}
-
-
-@pytest.fixture
-def site() -> str:
-    """A site that no other test uses."""
-    return f"refused-{next(_NUMBERS)}"
-
-
-async def _post(
-    client: httpx.AsyncClient, site: str, body: Any, headers: dict[str, str] | None = None
-) -> httpx.Response:
-    content = body if isinstance(body, bytes) else json.dumps(body).encode()
-    return await client.post(
-        f"/v1/sites/{site}/robots/r/scans", content=content, headers=headers or JSON
-    )
-
-
-def _problem(response: httpx.Response, status: int, slug: str) -> dict[str, Any]:
-    assert response.status_code == status, response.text
-    assert response.headers["content-type"] == "application/problem+json"
-    problem: dict[str, Any] = response.json()
-    assert problem["type"] == f"/problems/{slug}"
-    assert problem["status"] == status
-    assert problem["title"]
-    assert problem["detail"]
-    return problem
 
 
 MALFORMED: list[tuple[str, dict[str, Any], str]] = [
@@ -106,10 +73,10 @@ async def test_a_malformed_field_is_pointed_at(
     client: httpx.AsyncClient, site: str, make_scan: Make, changes: dict[str, Any], pointer: str
 ) -> None:
     scan = make_scan(0, **changes)
-    problem = _problem(await _post(client, site, scan), 422, "invalid-body")
+    problem = as_problem(await post_scans(client, site, scan), 422, "invalid-body")
     assert pointer in [error["pointer"] for error in problem["errors"]]
     assert all(error["reason"] for error in problem["errors"])
-    problem = _problem(await _post(client, site, {"scans": [scan]}), 422, "invalid-body")
+    problem = as_problem(await post_scans(client, site, {"scans": [scan]}), 422, "invalid-body")
     assert f"/scans/0{pointer}" in [error["pointer"] for error in problem["errors"]]
     assert (await client.get(f"/v1/sites/{site}")).status_code == 404
 
@@ -132,7 +99,7 @@ async def test_a_malformed_field_is_pointed_at(
 async def test_a_body_of_another_shape_is_pointed_at(
     client: httpx.AsyncClient, site: str, body: Any, pointer: str
 ) -> None:
-    problem = _problem(await _post(client, site, body), 422, "invalid-body")
+    problem = as_problem(await post_scans(client, site, body), 422, "invalid-body")
     assert pointer in [error["pointer"] for error in problem["errors"]]
 
 
@@ -159,27 +126,27 @@ async def test_a_body_of_another_shape_is_pointed_at(
 async def test_bytes_that_cannot_be_read(
     client: httpx.AsyncClient, site: str, body: bytes, headers: dict[str, str]
 ) -> None:
-    _problem(await _post(client, site, body, headers), 400, "malformed-body")
+    as_problem(await post_scans(client, site, body, headers), 400, "malformed-body")
 
 
 @pytest.mark.parametrize("content_type", ["", "text/plain", "application/x-www-form-urlencoded"])
 async def test_other_content_types_are_refused(
     client: httpx.AsyncClient, site: str, content_type: str
 ) -> None:
-    response = await _post(client, site, {}, {"Content-Type": content_type})
-    _problem(response, 415, "unsupported-media-type")
+    response = await post_scans(client, site, {}, {"Content-Type": content_type})
+    as_problem(response, 415, "unsupported-media-type")
 
 
 async def test_a_content_type_with_parameters_is_understood(
     client: httpx.AsyncClient, site: str, make_scan: Make
 ) -> None:
     headers = {"Content-Type": "Application/JSON; charset=utf-8"}
-    assert (await _post(client, site, make_scan(0), headers)).status_code == 202
+    assert (await post_scans(client, site, make_scan(0), headers)).status_code == 202
 
 
 async def test_other_encodings_are_refused(client: httpx.AsyncClient, site: str) -> None:
-    response = await _post(client, site, {}, {**JSON, "Content-Encoding": "br"})
-    _problem(response, 415, "unsupported-content-encoding")
+    response = await post_scans(client, site, {}, {**JSON, "Content-Encoding": "br"})
+    as_problem(response, 415, "unsupported-content-encoding")
 
 
 async def test_a_body_that_says_it_is_too_large_is_not_read(
@@ -193,14 +160,14 @@ async def test_a_body_that_says_it_is_too_large_is_not_read(
     response = await client.post(
         f"/v1/sites/{site}/robots/r/scans", content=body(), headers=headers
     )
-    _problem(response, 413, "too-large")
+    as_problem(response, 413, "too-large")
 
 
 async def test_a_gzip_bomb_is_not_inflated(client: httpx.AsyncClient, site: str) -> None:
     bomb = gzip.compress(b" " * (200 * 1024 * 1024), compresslevel=9)
     assert len(bomb) < 300_000
-    response = await _post(client, site, bomb, {**JSON, "Content-Encoding": "gzip"})
-    _problem(response, 413, "too-large")
+    response = await post_scans(client, site, bomb, {**JSON, "Content-Encoding": "gzip"})
+    as_problem(response, 413, "too-large")
 
 
 @pytest.mark.parametrize("name", ["-a", ".a", "a b", "a" * 65, "ä", "a%0A", "a%00"])
@@ -209,4 +176,4 @@ async def test_names_outside_the_pattern_are_refused(
 ) -> None:
     for path in (f"/v1/sites/{name}/robots/r/scans", f"/v1/sites/s/robots/{name}/scans"):
         response = await client.post(path, json=make_scan(0))
-        _problem(response, 422, "invalid-parameter")
+        as_problem(response, 422, "invalid-parameter")

@@ -9,7 +9,7 @@ from numba import njit
 
 from lineloom_core.features._kernels import LENGTH, THETA, X1, X2, Y1, Y2
 from lineloom_core.matching._free_space_kernels import CONFLICT, MATCHED, judge_pair
-from lineloom_core.matching._kernels import evidence
+from lineloom_core.matching._kernels import evidence, fill_row
 from lineloom_core.matching._proposal_kernels import (
     LONG_ENOUGH,
     compatible_pairs,
@@ -191,12 +191,7 @@ def match_bands(  # type: ignore[no-untyped-def]
             ref_points, ref_ranges, ref_min, ref_inc, cur_points, cur_ranges, cur_min, cur_inc,
             pose, 1, base, slope, counts,
         )  # fmt: skip
-        out[k, :3] = pose
-        out[k, 3], out[k, 4] = weight, weight
-        out[k, 5:9] = counts
-        out[k, 9] = overlap
-        out[k, 10], out[k, 11], out[k, 12] = H[0, 0], H[0, 1], H[0, 2]
-        out[k, 13], out[k, 14], out[k, 15] = H[1, 1], H[1, 2], H[2, 2]
+        fill_row(out[k], pose, weight, weight, counts, overlap, H)
         out[k, 16], out[k, 17], out[k, 18] = axis, weight, both
         rank[k] = evidence(out[k])
     return out[np.argsort(-rank, kind="mergesort")]

@@ -18,6 +18,17 @@ ALWAYS_COARSE, ALWAYS_FINE, WORTH_A_LOOK = 6, 3, 0.5
 
 
 @njit(cache=True)
+def fill_row(out, pose, explained, votes, counts, overlap, H):  # type: ignore[no-untyped-def]
+    """Write a hypothesis: x, y, theta, explained, votes, four counts, overlap, upper H."""
+    out[:3] = pose
+    out[3], out[4] = explained, votes
+    out[5:9] = counts
+    out[9] = overlap
+    out[10], out[11], out[12] = H[0, 0], H[0, 1], H[0, 2]
+    out[13], out[14], out[15] = H[1, 1], H[1, 2], H[2, 2]
+
+
+@njit(cache=True)
 def judge_proposals(  # type: ignore[no-untyped-def]
     proposals, ref, ref_ends, ref_edges, ref_circles, ref_points, ref_ranges, ref_min, ref_inc,
     cur, cur_ends, cur_edges, cur_circles, cur_points, cur_ranges, cur_min, cur_inc,
@@ -63,12 +74,7 @@ def judge_proposals(  # type: ignore[no-untyped-def]
             ref_points, ref_ranges, ref_min, ref_inc, cur_points, cur_ranges, cur_min, cur_inc,
             pose, FINE_STEP, base, slope, counts,
         )  # fmt: skip
-        out[kept, :3] = pose
-        out[kept, 3], out[kept, 4] = row[3], row[4]
-        out[kept, 5:9] = FINE_STEP * counts
-        out[kept, 9] = overlap
-        out[kept, 10], out[kept, 11], out[kept, 12] = H[0, 0], H[0, 1], H[0, 2]
-        out[kept, 13], out[kept, 14], out[kept, 15] = H[1, 1], H[1, 2], H[2, 2]
+        fill_row(out[kept], pose, row[3], row[4], FINE_STEP * counts, overlap, H)
         kept += 1
     rank = np.empty(kept)
     for k in range(kept):
