@@ -30,14 +30,28 @@ def join(site: SiteMap, root: int, keyframe: int) -> ComponentMerged | None:
     chosen, rival = _best_sets(site, candidates)
     objection = _objection_to_set(site, chosen, rival)
     if objection:
+        _wait(site, candidates, objection)
         return None
     members_a = {n: site.pose(n) for n in site.graph.component_of(a_root)}
     members_b = {n: site.pose(n) for n in site.graph.component_of(b_root)}
     T_A_B = rigid_join(members_a, members_b, [c.edge() for c in chosen])
     share = _conflict_share(site, chosen, T_A_B)
     if share > site.config.join.most_conflict:
+        _wait(site, chosen, f"the maps contradict each other there ({100 * share:.0f} %)")
         return None
-    survivor, absorbed = site.component_id(a_root), site.component_id(b_root)
+    merged = _accept(site, chosen, b_root, T_A_B, share)
+    _drop_others(site, candidates, chosen)
+    site.optimise(a_root)
+    return merged
+
+
+def _accept(
+    site: SiteMap, chosen: list[Constraint], b_root: int, T_A_B: Pose, share: float
+) -> ComponentMerged:
+    """Carry b's component into a's frame and put the set into the graph."""
+    survivor, absorbed = (
+        site.component_id(k) for k in (chosen[0].keyframe_a, chosen[0].keyframe_b)
+    )
     site.move_component(b_root, T_A_B)
     ids = tuple(c.id for c in chosen)
     for constraint in chosen:
@@ -45,10 +59,14 @@ def join(site: SiteMap, root: int, keyframe: int) -> ComponentMerged | None:
             "accepted", f"{len(ids)} constraints agree", consistency_set=ids
         )
         site.add_constraint(replace(accepted, checks={**accepted.checks, "map_conflict": share}))
-    _drop_others(site, candidates, chosen)
-    site.optimise(a_root)
     site.merged_into[absorbed] = survivor
     return ComponentMerged(survivor, absorbed, ids)
+
+
+def _wait(site: SiteMap, candidates: list[Constraint], objection: str) -> None:
+    """Join nothing yet, and let every candidate say what it waits for."""
+    for c in candidates:
+        site.add_constraint(site.constraints[c.id].moved_to("candidate", objection))
 
 
 def _candidates_between(site: SiteMap, a_root: int, b_root: int) -> list[Constraint]:

@@ -117,6 +117,7 @@ def test_three_on_one_place_are_one_witness(meeting: Meeting) -> None:
         again = replace(first, id=meeting.site.new_constraint_id())
         meeting.site.add_constraint(again)
     assert meeting.join() is None
+    assert said(meeting) == {"all constraints rest on one place"}
 
 
 def test_three_that_contradict_each_other_join_nothing(meeting: Meeting) -> None:
@@ -131,6 +132,13 @@ def test_little_evidence_joins_nothing(meeting: Meeting) -> None:
     for i in spread(meeting, 3):
         meeting.candidate(i, evidence=10.0)
     assert meeting.join() is None
+    assert said(meeting) == {"too little evidence in all"}
+
+
+def said(meeting: Meeting) -> set[str]:
+    """What the open candidates say they wait for."""
+    constraints = meeting.site.constraints.values()
+    return {c.reason for c in constraints if c.state == "candidate"}
 
 
 def shifted(meeting: Meeting, i: int, T: Pose, evidence: float) -> Constraint:
@@ -164,6 +172,9 @@ def test_a_story_that_puts_walls_into_free_space_is_refused(meeting: Meeting, T:
     for i in spread(meeting, 4):
         shifted(meeting, i, T, STRONG)
     assert meeting.join() is None
+    assert {reason.split(" there ")[0] for reason in said(meeting)} == {
+        "the maps contradict each other"
+    }
     assert not meeting.site.same_component(meeting.a[0], meeting.b[0])
 
 
