@@ -19,7 +19,7 @@ import pickle
 
 import numpy as np
 
-from lineloom_core.features import extract_features
+from lineloom_core.features import ScanFeatures, extract_features
 from lineloom_core.geometry import Pose
 from lineloom_core.mapping.candidates import consider
 from lineloom_core.mapping.changes import Changes, ComponentMerged
@@ -36,7 +36,7 @@ from lineloom_core.mapping.view_builder import build_view
 from lineloom_core.matching.local_map import Cloud, LocalMap
 from lineloom_core.scan import Mount, Scan
 
-SNAPSHOT_FORMAT = 2
+SNAPSHOT_FORMAT = 3
 _CLOSURES_UNSOLVED = 6
 
 
@@ -52,7 +52,8 @@ class SiteMapper:
         self._site = SiteMap(self._config)
         self._robots: dict[str, RobotRecord] = {}
         self._version = 0
-        self._unsolved = 0  # closures accepted since the graph was last solved
+        self._unsolved: dict[int, int] = {}
+        """By component root: closures accepted since it was last solved."""
 
     @property
     def version(self) -> int:
@@ -73,21 +74,9 @@ class SiteMapper:
             record.tracker = None  # restarted: it may have been carried anywhere
             record.sessions[scan.session] = None
         record.session, record.seq, record.stamp = scan.session, scan.seq, scan.stamp
-        if len(features.points) == 0:
-            record.unplaced += 1
-            return Changes(placed=False)
-        if record.tracker is None:
-            record.tracker, record.track = Tracker(self._config.tracker), None
-        tracked = record.tracker.track(features, cloud, scan.stamp, _laser_odometry(record, scan))
-        if tracked.status == "lost":
-            record.tracker, record.track, record.state = None, None, "lost"
-            record.tracker = Tracker(self._config.tracker)
-            tracked = record.tracker.track(
-                features, cloud, scan.stamp, _laser_odometry(record, scan)
-            )
-        if tracked.pose is None:
-            record.unplaced += 1
-            return Changes(placed=False)
+        tracked = self._track(record, scan, features, cloud) if len(features.points) else None
+        if tracked is None or tracked.pose is None:
+            return _unplaced(record)
         return self._place(record, scan, tracked)
 
     def set_mount(self, robot: str, mount: Mount) -> None:
@@ -133,6 +122,19 @@ class SiteMapper:
         mapper._site, mapper._robots, mapper._version = site, robots, version
         mapper._unsolved = unsolved
         return mapper
+
+    def _track(
+        self, record: RobotRecord, scan: Scan, features: ScanFeatures, cloud: Cloud
+    ) -> Tracked:
+        """Step 3: the robot's track goes on, or a new one begins without any link to the old."""
+        if record.tracker is None:
+            record.tracker, record.track = Tracker(self._config.tracker), None
+        odometry = _laser_odometry(record, scan)
+        tracked = record.tracker.track(features, cloud, scan.stamp, odometry)
+        if tracked.status == "lost":
+            record.tracker, record.track = Tracker(self._config.tracker), None
+            tracked = record.tracker.track(features, cloud, scan.stamp, odometry)
+        return tracked
 
     def _place(self, record: RobotRecord, scan: Scan, tracked: Tracked) -> Changes:
         """Steps 4 to 7 for a scan that the tracker placed."""
@@ -193,11 +195,12 @@ class SiteMapper:
         closed = close_nearby(self._site, keyframe)
         if closed is None:
             return False
-        self._unsolved += 1
+        root = self._site.component_root(keyframe)
+        waiting = self._unsolved.pop(root, 0) + 1
         step = closed.checks["moved_m"] + 2.0 * closed.checks["turned_rad"]
-        if step < 0.05 and self._unsolved < _CLOSURES_UNSOLVED:
+        if step < 0.05 and waiting < _CLOSURES_UNSOLVED:
+            self._unsolved[root] = waiting
             return False  # says what the graph knew: it can wait for the next that does not
-        self._unsolved = 0
         self._site.optimise(keyframe)
         return True
 
@@ -250,6 +253,14 @@ class SiteMapper:
                 return Changes(placed=True)
         record.unplaced += 1
         return Changes(placed=False)
+
+
+def _unplaced(record: RobotRecord) -> Changes:
+    """The latest scan has no pose: say so, until one has."""
+    record.unplaced += 1
+    if record.placed:
+        record.state = "lost"
+    return Changes(placed=False)
 
 
 def _is_late(record: RobotRecord, scan: Scan) -> bool:

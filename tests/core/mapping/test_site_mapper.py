@@ -184,11 +184,14 @@ def test_a_scan_with_nothing_but_no_returns_is_counted_and_harmless(
     for i, entry in enumerate(own):
         if i in (0, 50, 51, 52, 53, 54, 55, 119):  # more in a row than the tracker has patience
             assert not disturbed.add("robot-1", empty(entry.scan)).placed
+            state = disturbed.view().robots["robot-1"].state
+            assert state == ("lost" if i else "starting")  # the latest scan has no pose
         disturbed.add("robot-1", entry.scan)
     a, b = plain.view(), disturbed.view()
     assert b.robots["robot-1"].scans_processed == len(own) + 8
     assert b.trajectories["robot-1"].poses.tobytes() == a.trajectories["robot-1"].poses.tobytes()
     assert b.components == a.components
+    assert b.robots["robot-1"].state == "tracking"
 
 
 def test_a_robot_that_has_seen_nothing_yet_is_starting(log: list[SimulatedScan]) -> None:
