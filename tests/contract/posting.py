@@ -25,8 +25,8 @@ async def post_scans(
     )
 
 
-def as_problem(response: httpx.Response, status: int, slug: str) -> dict[str, Any]:
-    """The problem document of a refusal, checked for what every problem must have."""
+def expect_problem(response: httpx.Response, status: int, slug: str) -> dict[str, Any]:
+    """Assert a refusal with all that every problem must have; return its document."""
     assert response.status_code == status, response.text
     assert response.headers["content-type"] == "application/problem+json"
     problem: dict[str, Any] = response.json()

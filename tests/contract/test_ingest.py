@@ -16,7 +16,7 @@ from lineloom_core.scan import MAX_BEAMS
 from lineloom_service.service import Service
 from lineloom_service.store.codec import decode_scan
 
-from tests.contract.posting import MSGPACK, Idle, Make, as_problem, post_scans
+from tests.contract.posting import MSGPACK, Idle, Make, expect_problem, post_scans
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 
@@ -80,7 +80,7 @@ async def test_a_batch_without_a_good_scan_is_refused_with_all_its_faults(
     client: httpx.AsyncClient, site: str, make_scan: Make
 ) -> None:
     body = {"scans": [make_scan(0, stamp="1.0"), make_scan(1, range_max=0.05)]}
-    problem = as_problem(await post_scans(client, site, body), 422, "invalid-body")
+    problem = expect_problem(await post_scans(client, site, body), 422, "invalid-body")
     assert [e["pointer"] for e in problem["errors"]] == ["/scans/0/stamp", "/scans/1/range_max"]
     assert (await client.get(f"/v1/sites/{site}")).status_code == 404
 
@@ -150,7 +150,7 @@ async def test_msgpack_takes_packed_floats_and_nan(
     assert repr(scan.ranges.tolist()) == repr([1.5, math.nan, math.inf, 2.0, -math.inf])
     for ranges in (b"", b"123", b"\x00" * 4 * (MAX_BEAMS + 1), [b"1"], [msgpack.Timestamp(1)]):
         body = msgpack.packb(make_scan(1, ranges=ranges))
-        as_problem(await post_scans(client, site, body, MSGPACK), 422, "invalid-body")
+        expect_problem(await post_scans(client, site, body, MSGPACK), 422, "invalid-body")
 
 
 async def test_out_of_order_batches_are_mapped_in_order(
@@ -184,7 +184,7 @@ async def test_a_full_backlog_is_429_and_takes_nothing(
     assert (await post_scans(client, site, first)).status_code == 202
     second = {"scans": [make_scan(seq) for seq in range(450, 550)]}
     response = await post_scans(client, site, second)
-    as_problem(response, 429, "backlog-full")
+    expect_problem(response, 429, "backlog-full")
     assert int(response.headers["retry-after"]) >= 1
     record = await service.store.site(site)
     assert record is not None

@@ -36,7 +36,7 @@ async def _get(client: httpx.AsyncClient, path: str, **params: str) -> httpx.Res
     return response
 
 
-async def _refused(
+async def _expect_refusal(
     client: httpx.AsyncClient, path: str, status: int, slug: str, **params: str
 ) -> dict[str, Any]:
     response = await client.get(path, params=params)
@@ -120,10 +120,10 @@ async def test_transform(client: httpx.AsyncClient) -> None:
 
 
 async def test_transform_of_robots_that_never_met(client: httpx.AsyncClient) -> None:
-    problem = await _refused(client, f"{SITE}/transforms/a/alone", 409, "not-connected")
+    problem = await _expect_refusal(client, f"{SITE}/transforms/a/alone", 409, "not-connected")
     assert "c1" in problem["detail"]
     assert "c-alone" in problem["detail"]
-    await _refused(client, f"{SITE}/transforms/a/nobody", 404, "unknown-robot")
+    await _expect_refusal(client, f"{SITE}/transforms/a/nobody", 404, "unknown-robot")
 
 
 async def test_map_as_json(client: httpx.AsyncClient) -> None:
@@ -160,13 +160,13 @@ async def test_map_formats(client: httpx.AsyncClient) -> None:
     geojson = await _get(client, "/map", format="geojson")
     assert geojson.headers["content-type"] == "application/geo+json"
     assert geojson.json()["type"] == "FeatureCollection"
-    problem = await _refused(client, f"{SITE}/map", 422, "unknown-format", format="bmp")
+    problem = await _expect_refusal(client, f"{SITE}/map", 422, "unknown-format", format="bmp")
     assert problem["detail"] == "no format 'bmp'; available are json, geojson, svg, png"
 
 
 @pytest.mark.parametrize("bbox", ["", "1,2,3", "1,2,3,4,5", "a,b,c,d", "0,0,0,1", "nan,0,1,1"])
 async def test_a_bbox_that_is_none(client: httpx.AsyncClient, bbox: str) -> None:
-    problem = await _refused(client, f"{SITE}/map", 422, "invalid-parameter", bbox=bbox)
+    problem = await _expect_refusal(client, f"{SITE}/map", 422, "invalid-parameter", bbox=bbox)
     assert "bbox" in problem["detail"]
 
 
@@ -177,7 +177,7 @@ async def test_a_component_that_was_merged_points_to_its_survivor(
     assert response.status_code == 307
     assert response.headers["location"] == f"{SITE}/map?component=c1&format=json"
     assert response.json() == {"component": "c9", "merged_into": "c1"}
-    await _refused(client, f"{SITE}/map", 404, "unknown-component", component="c77")
+    await _expect_refusal(client, f"{SITE}/map", 404, "unknown-component", component="c77")
 
 
 async def test_a_map_that_did_not_change_is_304(
@@ -208,7 +208,7 @@ async def test_graph(client: httpx.AsyncClient) -> None:
     g2o = await _get(client, "/graph", format="g2o")
     assert g2o.text.count("VERTEX_SE2") == 3
     assert g2o.text.count("EDGE_SE2") == 1
-    await _refused(client, f"{SITE}/graph", 422, "unknown-format", format="dot")
+    await _expect_refusal(client, f"{SITE}/graph", 422, "unknown-format", format="dot")
 
 
 async def test_constraints(client: httpx.AsyncClient) -> None:
@@ -239,7 +239,7 @@ async def test_constraints_by_pages(client: httpx.AsyncClient) -> None:
 async def test_constraint_filters_that_are_none(
     client: httpx.AsyncClient, params: dict[str, str]
 ) -> None:
-    await _refused(client, f"{SITE}/constraints", 422, "invalid-parameter", **params)
+    await _expect_refusal(client, f"{SITE}/constraints", 422, "invalid-parameter", **params)
 
 
 @pytest.mark.parametrize(
@@ -257,7 +257,7 @@ async def test_constraint_filters_that_are_none(
     ],
 )
 async def test_what_is_not_there(client: httpx.AsyncClient, path: str, slug: str) -> None:
-    await _refused(client, path, 404, slug)
+    await _expect_refusal(client, path, 404, slug)
 
 
 async def test_alive_and_ready(client: httpx.AsyncClient) -> None:

@@ -11,7 +11,7 @@ import httpx
 import pytest
 from lineloom_core.scan import MAX_BEAMS
 
-from tests.contract.posting import JSON, MSGPACK, Make, as_problem, post_scans
+from tests.contract.posting import JSON, MSGPACK, Make, expect_problem, post_scans
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 
@@ -73,10 +73,10 @@ async def test_a_malformed_field_is_pointed_at(
     client: httpx.AsyncClient, site: str, make_scan: Make, changes: dict[str, Any], pointer: str
 ) -> None:
     scan = make_scan(0, **changes)
-    problem = as_problem(await post_scans(client, site, scan), 422, "invalid-body")
+    problem = expect_problem(await post_scans(client, site, scan), 422, "invalid-body")
     assert pointer in [error["pointer"] for error in problem["errors"]]
     assert all(error["reason"] for error in problem["errors"])
-    problem = as_problem(await post_scans(client, site, {"scans": [scan]}), 422, "invalid-body")
+    problem = expect_problem(await post_scans(client, site, {"scans": [scan]}), 422, "invalid-body")
     assert f"/scans/0{pointer}" in [error["pointer"] for error in problem["errors"]]
     assert (await client.get(f"/v1/sites/{site}")).status_code == 404
 
@@ -99,7 +99,7 @@ async def test_a_malformed_field_is_pointed_at(
 async def test_a_body_of_another_shape_is_pointed_at(
     client: httpx.AsyncClient, site: str, body: Any, pointer: str
 ) -> None:
-    problem = as_problem(await post_scans(client, site, body), 422, "invalid-body")
+    problem = expect_problem(await post_scans(client, site, body), 422, "invalid-body")
     assert pointer in [error["pointer"] for error in problem["errors"]]
 
 
@@ -126,7 +126,7 @@ async def test_a_body_of_another_shape_is_pointed_at(
 async def test_bytes_that_cannot_be_read(
     client: httpx.AsyncClient, site: str, body: bytes, headers: dict[str, str]
 ) -> None:
-    as_problem(await post_scans(client, site, body, headers), 400, "malformed-body")
+    expect_problem(await post_scans(client, site, body, headers), 400, "malformed-body")
 
 
 @pytest.mark.parametrize("content_type", ["", "text/plain", "application/x-www-form-urlencoded"])
@@ -134,7 +134,7 @@ async def test_other_content_types_are_refused(
     client: httpx.AsyncClient, site: str, content_type: str
 ) -> None:
     response = await post_scans(client, site, {}, {"Content-Type": content_type})
-    as_problem(response, 415, "unsupported-media-type")
+    expect_problem(response, 415, "unsupported-media-type")
 
 
 async def test_a_content_type_with_parameters_is_understood(
@@ -146,7 +146,7 @@ async def test_a_content_type_with_parameters_is_understood(
 
 async def test_other_encodings_are_refused(client: httpx.AsyncClient, site: str) -> None:
     response = await post_scans(client, site, {}, {**JSON, "Content-Encoding": "br"})
-    as_problem(response, 415, "unsupported-content-encoding")
+    expect_problem(response, 415, "unsupported-content-encoding")
 
 
 async def test_a_body_that_says_it_is_too_large_is_not_read(
@@ -160,14 +160,14 @@ async def test_a_body_that_says_it_is_too_large_is_not_read(
     response = await client.post(
         f"/v1/sites/{site}/robots/r/scans", content=body(), headers=headers
     )
-    as_problem(response, 413, "too-large")
+    expect_problem(response, 413, "too-large")
 
 
 async def test_a_gzip_bomb_is_not_inflated(client: httpx.AsyncClient, site: str) -> None:
     bomb = gzip.compress(b" " * (200 * 1024 * 1024), compresslevel=9)
     assert len(bomb) < 300_000
     response = await post_scans(client, site, bomb, {**JSON, "Content-Encoding": "gzip"})
-    as_problem(response, 413, "too-large")
+    expect_problem(response, 413, "too-large")
 
 
 @pytest.mark.parametrize("name", ["-a", ".a", "a b", "a" * 65, "ä", "a%0A", "a%00"])
@@ -176,4 +176,4 @@ async def test_names_outside_the_pattern_are_refused(
 ) -> None:
     for path in (f"/v1/sites/{name}/robots/r/scans", f"/v1/sites/s/robots/{name}/scans"):
         response = await client.post(path, json=make_scan(0))
-        as_problem(response, 422, "invalid-parameter")
+        expect_problem(response, 422, "invalid-parameter")
