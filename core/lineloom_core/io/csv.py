@@ -1,12 +1,17 @@
-"""A trajectory as a table of comma-separated values."""
+"""A trajectory, or the map's lines, as a table of comma-separated values."""
 
 from __future__ import annotations
 
 import csv
 import io
 
-from lineloom_core.mapping.site_view import TrajectoryView
+from lineloom_core.io.selection import BBox, select
+from lineloom_core.mapping.site_view import SiteView, TrajectoryView
 
+MAP_COLUMNS = (
+    *("id", "component", "x1", "y1", "x2", "y2"),
+    *("sigma", "support", "robots", "first_seen", "last_seen"),
+)
 COLUMNS = ("session", "seq", "stamp", "component", "x", "y", "theta")
 
 
@@ -24,4 +29,20 @@ def write_trajectory(trajectory: TrajectoryView) -> str:
         strict=True,
     ):
         writer.writerow((session, seq, repr(stamp), component, repr(x), repr(y), repr(theta)))
+    return target.getvalue()
+
+
+def write_map(view: SiteView, component: str | None = None, bbox: BBox | None = None) -> str:
+    """Return a header and one row per line of the map (m, s; full precision).
+
+    `robots` are separated by spaces: their names hold none. Raises as `selection.select` does.
+    """
+    target = io.StringIO()
+    writer = csv.writer(target, lineterminator="\n")
+    writer.writerow(MAP_COLUMNS)
+    for content in select(view, component, bbox):
+        for w in content.lines:
+            figures = [repr(v) for v in (w.x1, w.y1, w.x2, w.y2, w.sigma)]
+            seen = (" ".join(w.robots), repr(w.first_seen), repr(w.last_seen))
+            writer.writerow((w.id, w.component, *figures, w.support, *seen))
     return target.getvalue()

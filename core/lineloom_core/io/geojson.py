@@ -1,4 +1,9 @@
-"""The map as GeoJSON (RFC 7946 in form; in local metres, and it says so)."""
+"""The map as GeoJSON (RFC 7946 in form; in local metres, and it says so).
+
+RFC 7946 knows longitude and latitude only. So `coordinates` says in words what the numbers are,
+and `coordRefSys` says it as OGC Features and Geometries JSON (JSON-FG) does: a local engineering
+frame, with each geometry in `place` as well as, for plain readers, in `geometry`.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +16,9 @@ _NOTE = (
     "Coordinates are metres in the map frame of the feature's component, x forward, y left; "
     "they are not longitude and latitude. Frames of different components are unrelated."
 )
+_CORE = "http://www.opengis.net/spec/json-fg-1/1.0/conf/core"
+_LOCAL_METRES = "urn:lineloom:crs:local-metres"
+"""A name of our own: no authority has one for a frame that hangs on a robot's first scan."""
 _DECIMALS = 4  # a tenth of a millimetre
 
 
@@ -27,6 +35,8 @@ def map_features(
     features = [feature for content in contents for feature in _features(content)]
     collection: dict[str, Any] = {
         "type": "FeatureCollection",
+        "conformsTo": [_CORE],
+        "coordRefSys": _LOCAL_METRES,
         "coordinates": {"frame": "local", "unit": "metre", "note": _NOTE},
         "version": view.version,
         "components": [
@@ -82,9 +92,11 @@ def _wall(line: MapLine) -> dict[str, Any]:
 def _feature(
     geometry: str, coordinates: list[Any], properties: dict[str, Any], name: str | None = None
 ) -> dict[str, Any]:
+    shape = {"type": geometry, "coordinates": _rounded(coordinates)}
     feature: dict[str, Any] = {
         "type": "Feature",
-        "geometry": {"type": geometry, "coordinates": _rounded(coordinates)},
+        "geometry": shape,
+        "place": shape,
         "properties": properties,
     }
     return feature if name is None else {"id": name, **feature}

@@ -1,0 +1,19 @@
+"""The scans of a component's keyframes as rays, where the graph has them now."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lineloom_core.fusion.occupancy import Rays
+from lineloom_core.mapping.site_map import SiteMap
+
+
+def component_rays(site: SiteMap, component: str) -> Rays:
+    """Return the rays of all keyframes of a component, in its map frame; none if there is none."""
+    members = [k for k in sorted(site.keyframes) if site.component_id(k) == component]
+    scans = [site.keyframes[k].scan for k in members]
+    return Rays.of(
+        [site.pose(k).to_array() for k in members],
+        [(scan.angle_min, scan.angle_increment) for scan in scans],
+        [np.asarray(scan.ranges) for scan in scans],
+    )
