@@ -1,6 +1,7 @@
 """Pose graph: constraints, which of them to believe, and the poses that fit them best."""
 
 from lineloom_core.graph.consistency import (
+    CHI2_99,
     consistent_sets,
     cycle_errors,
     largest_consistent_set,
@@ -20,6 +21,7 @@ from lineloom_core.graph.pose_graph import PoseGraph
 from lineloom_core.graph.solver import Solution, optimize
 
 __all__ = [
+    "CHI2_99",
     "Covariances",
     "Edge",
     "EdgeKind",

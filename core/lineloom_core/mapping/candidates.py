@@ -12,17 +12,28 @@ from numpy.typing import NDArray
 
 from lineloom_core.geometry import Pose
 from lineloom_core.mapping.changes import ComponentMerged
-from lineloom_core.mapping.constraint import Constraint, closure_information, turned
+from lineloom_core.mapping.constraint import (
+    Constraint,
+    closure_information,
+    recognition_id,
+    turned,
+)
 from lineloom_core.mapping.joining import join
 from lineloom_core.mapping.looping import close_loops
 from lineloom_core.mapping.site_map import SiteMap
-from lineloom_core.places import Place, Recognition, recognise
+from lineloom_core.places import Place, Recognition
+
+_REFUSED_KEPT = 3
+"""Refused recognitions that are kept per place, best first, so that they can be looked at."""
 
 
 def consider(site: SiteMap, place: Place) -> tuple[list[ComponentMerged], bool]:
     """Look for a new place among all others; return the merges and whether poses moved."""
-    fresh = [found for other in _worth_trying(site, place) if (found := _try(site, other, place))]
-    for constraint in fresh:
+    found = [_try(site, other, place) for other in _worth_trying(site, place)]
+    fresh = [c for c in found if c is not None and c.state == "candidate"]
+    refused = [c for c in found if c is not None and c.state == "rejected"]
+    refused.sort(key=lambda c: (-c.evidence, c.id))
+    for constraint in (*fresh, *refused[:_REFUSED_KEPT]):
         site.add_constraint(constraint)
     merges: list[ComponentMerged] = []
     moved = False
@@ -52,7 +63,8 @@ def _worth_trying(site: SiteMap, place: Place) -> list[Place]:
         if not site.same_component(other.anchor, place.anchor):
             chosen.append(other)
             continue
-        if tied or (other.track == place.track and not _lies_apart(site, other, place)):
+        near = site.same_track(other.anchor, place.anchor) and not _lies_apart(site, other, place)
+        if tied or near:
             continue
         distance = site.pose(other.anchor).distance(site.pose(place.anchor))
         slack = 3.0 * site.config.join.drift_rate[0] * site.way_between(other.anchor, place.anchor)
@@ -68,20 +80,23 @@ def _lies_apart(site: SiteMap, other: Place, place: Place) -> bool:
 
 def _try(site: SiteMap, reference: Place, current: Place) -> Constraint | None:
     """Recognise one place in another; a plausible outcome becomes a candidate."""
-    found = recognise(reference, current, site.config.recognition)
-    if not found.plausible or found.T_reference_current is None:
+    name = recognition_id(reference.id, current.id)
+    if site.verdicts.barred(name):
+        return None
+    found = site.memory.recognise(reference, current)
+    if found.T_reference_current is None:
         return None
     same = site.same_component(reference.anchor, current.anchor)
     a, b, T_a_b = _nearest_keyframes(reference, current, found.T_reference_current)
     return Constraint(
-        id=site.new_constraint_id(),
+        id=name,
         kind="loop" if same else "rendezvous",
-        state="candidate",
+        state="candidate" if found.plausible else "rejected",
         keyframe_a=a,
         keyframe_b=b,
         T_a_b=T_a_b,
         information=_information_at(found, current, b),
-        reason="waiting for others that agree",
+        reason="waiting for others that agree" if found.plausible else found.reason,
         checks=found.checks,
         place_a=reference.id,
         place_b=current.id,

@@ -19,12 +19,14 @@ class Changes:
     """The answer of `SiteMapper.add`.
 
     placed: the scan has a pose. started_component: the scan opened a new component.
-    keyframe: id of the keyframe made of it. merges: components joined now. optimised: the pose
-    graph moved, so poses and lines of before are out of date.
+    keyframe: id of the keyframe made of it. merges: components joined now. withdrawn: constraints
+    that the scan showed to be wrong, and that are as if they had never been accepted. optimised:
+    the pose graph moved, so poses and lines of before are out of date.
     """
 
     placed: bool
     started_component: str | None = None
     keyframe: int | None = None
     merges: tuple[ComponentMerged, ...] = ()
+    withdrawn: tuple[str, ...] = ()
     optimised: bool = False

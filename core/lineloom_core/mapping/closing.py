@@ -8,7 +8,7 @@ cannot glue similar places together: a window of a few decimetres holds no secon
 from __future__ import annotations
 
 from lineloom_core.geometry import Pose, angle_difference
-from lineloom_core.mapping.constraint import Constraint, closure_information, turned
+from lineloom_core.mapping.constraint import Constraint, closure_id, closure_information, turned
 from lineloom_core.mapping.keyframe import Keyframe
 from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.matching.free_space import judge_sweeps
@@ -18,7 +18,7 @@ from lineloom_core.matching.local_map import Cloud, LocalMap
 def close_nearby(site: SiteMap, keyframe: int) -> Constraint | None:
     """Try to tie a keyframe to an older part of its component; return the accepted constraint."""
     older = _partner(site, keyframe)
-    if older is None:
+    if older is None or site.verdicts.barred(closure_id(older, keyframe)):
         return None
     found = _register(site, older, keyframe)
     if found is not None:
@@ -44,8 +44,8 @@ def _partner(site: SiteMap, keyframe: int) -> int | None:
 
 
 def _apart(site: SiteMap, older: int, newer: int) -> bool:
-    a, b = site.keyframes[older], site.keyframes[newer]
-    return a.track != b.track or site.driven_between(older, newer) > site.config.closure.apart
+    same = site.same_track(older, newer)
+    return not same or site.driven_between(older, newer) > site.config.closure.apart
 
 
 def _register(site: SiteMap, older: int, newer: int) -> Constraint | None:
@@ -72,7 +72,7 @@ def _register(site: SiteMap, older: int, newer: int) -> Constraint | None:
     ):
         return None
     return Constraint(
-        id=site.new_constraint_id(),
+        id=closure_id(older, newer),
         kind="loop",
         state="accepted",
         keyframe_a=older,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lineloom_core.geometry import Pose
 from lineloom_core.graph import Edge, project_out_weak
-from lineloom_core.mapping.site_view import ConstraintKind, ConstraintState
+from lineloom_core.mapping.site_view import ConstraintKind, ConstraintState, StateChange
 
 INDEPENDENT_SHARE = 0.05
 """Neighbouring points of a scan err together: this share of them counts as independent."""
@@ -25,8 +25,10 @@ _FLOOR = np.diag([0.006**2, 0.006**2, 0.002**2])  # m^2, m^2, rad^2: the lidar's
 class Constraint:
     """T_a_b between two keyframes and its state.
 
-    information: 3x3 in the tangent at b. place_a, place_b: the places it came from, -1 where it
-    came from two keyframes alone. evidence: metres of wall that speak for it.
+    id: made of what is compared (`step_id`, `closure_id`, `recognition_id`), so that the same pair
+    has the same name however often the history is gone through. information: 3x3 in the tangent
+    at b. place_a, place_b: the places it came from, -1 where it came from two keyframes alone.
+    evidence: metres of wall that speak for it. history: how it came to its state.
     """
 
     id: str
@@ -42,16 +44,29 @@ class Constraint:
     place_a: int = -1
     place_b: int = -1
     evidence: float = 0.0
+    history: tuple[StateChange, ...] = ()
 
     def moved_to(
-        self, state: ConstraintState, reason: str, *, consistency_set: tuple[str, ...] = ()
+        self,
+        state: ConstraintState,
+        reason: str,
+        at: int = 0,
+        *,
+        consistency_set: tuple[str, ...] = (),
     ) -> Constraint:
-        """The same constraint in another state, for the reason given."""
+        """The same constraint in another state, for the reason given; at: the version it is then.
+
+        Only moves are history: what an open candidate waits for may change with every scan.
+        """
+        move = StateChange(at, state, reason)
+        same = bool(self.history) and self.history[-1].state == state
+        before = self.history[:-1] if same else self.history
         return replace(
             self,
             state=state,
             reason=reason,
             consistency_set=consistency_set or self.consistency_set,
+            history=(*before, replace(move, version=self.history[-1].version) if same else move),
         )
 
     def edge(self) -> Edge:
@@ -65,6 +80,36 @@ class Constraint:
             information=self.information,
             robust=self.kind != "sequential",
         )
+
+
+def step_id(keyframe: int) -> str:
+    """Id of the step that leads to a keyframe from the one before it."""
+    return f"s{keyframe}"
+
+
+def closure_id(older: int, newer: int) -> str:
+    """Id of a loop between two keyframes that the graph predicted to be near each other."""
+    return f"n{older}-{newer}"
+
+
+def recognition_id(reference: int, current: int) -> str:
+    """Id of what came of recognising one place in another."""
+    return f"p{reference}-{current}"
+
+
+def turned_round(c: Constraint) -> Constraint:
+    """The same constraint, written from its other end."""
+    # A tangent at b is -Ad(T_a_b) of itself at a: the information goes along.
+    A = c.T_a_b.inverse().adjoint()
+    return replace(
+        c,
+        keyframe_a=c.keyframe_b,
+        keyframe_b=c.keyframe_a,
+        T_a_b=c.T_a_b.inverse(),
+        information=A.T @ c.information @ A,
+        place_a=c.place_b,
+        place_b=c.place_a,
+    )
 
 
 def turned(information: NDArray[np.float64], angle: float) -> NDArray[np.float64]:

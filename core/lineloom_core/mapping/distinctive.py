@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from lineloom_core.mapping.constraint import Constraint
 from lineloom_core.mapping.site_map import SiteMap
-from lineloom_core.places import Place, alias_evidence
+from lineloom_core.places import Place, evidence_elsewhere
 
 
 def is_distinctive(site: SiteMap, candidate: Constraint) -> bool:
@@ -33,11 +33,9 @@ def _look_alike(site: SiteMap, place: Place) -> float:
 
 
 def _pair(site: SiteMap, other: Place, place: Place) -> float:
-    """Alias evidence of two places whose relative pose is known; asked once, then remembered."""
-    key = (min(other.id, place.id), max(other.id, place.id))
-    if key not in site.alias:
-        known = site.pose(other.anchor).between(site.pose(place.anchor))
-        rate = site.config.join.drift_rate[0]
-        slack = 3.0 * rate * site.way_between(other.anchor, place.anchor)
-        site.alias[key] = alias_evidence(other, place, known, slack, site.config.recognition)
-    return site.alias[key]
+    """Evidence for another relative pose of two places than the one that is known."""
+    first, second = (other, place) if other.id < place.id else (place, other)
+    known = site.pose(first.anchor).between(site.pose(second.anchor))
+    slack = 3.0 * site.config.join.drift_rate[0] * site.way_between(first.anchor, second.anchor)
+    table = site.memory.hypotheses(first, second)
+    return evidence_elsewhere(table, known, site.config.recognition, slack=slack)

@@ -1,10 +1,10 @@
 """Joining two components: when a set of constraints convinces.
 
-Steps of `join`: 1. find the largest set of candidates that agree pairwise (PCM); 2. demand its
-size, its evidence, and that no other set rivals it; 3. demand that the places it rests on are
-distinctive: nothing elsewhere in their own component, where the truth is known, looks as much
-like them; 4. hold both maps against each other wherever they would overlap; 5. accept, join,
-optimise.
+Steps of `join`: 1. leave out what says the same as something barred; 2. find the largest set of
+candidates that agree pairwise (PCM); 3. demand its size, its evidence, and that no other set rivals
+it; 4. demand that the places it rests on are distinctive: nothing elsewhere in their own component,
+where the truth is known, looks as much like them; 5. hold both maps against each other wherever
+they would overlap; 6. accept, join, optimise.
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ import numpy as np
 from lineloom_core.geometry import Pose
 from lineloom_core.graph import consistent_sets, pairwise_consistent, rigid_join
 from lineloom_core.mapping.changes import ComponentMerged
-from lineloom_core.mapping.constraint import CONSTRAINT_FLOOR, Constraint
+from lineloom_core.mapping.constraint import CONSTRAINT_FLOOR, Constraint, turned_round
 from lineloom_core.mapping.distinctive import is_distinctive
+from lineloom_core.mapping.refusals import refuse_barred
 from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.places import Place, count_points
 
@@ -26,7 +27,7 @@ def join(site: SiteMap, root: int, keyframe: int) -> ComponentMerged | None:
     """Join the component of `keyframe` with that of `root` if a set of candidates convinces."""
     other_root = site.component_root(keyframe)
     a_root, b_root = min(root, other_root), max(root, other_root)
-    candidates = _candidates_between(site, a_root, b_root)
+    candidates = refuse_barred(site, _candidates_between(site, a_root, b_root))
     chosen, rival = _best_sets(site, candidates)
     objection = _objection_to_set(site, chosen, rival)
     if objection:
@@ -56,7 +57,7 @@ def _accept(
     ids = tuple(c.id for c in chosen)
     for constraint in chosen:
         accepted = constraint.moved_to(
-            "accepted", f"{len(ids)} constraints agree", consistency_set=ids
+            "accepted", f"{len(ids)} constraints agree", site.now, consistency_set=ids
         )
         site.add_constraint(replace(accepted, checks={**accepted.checks, "map_conflict": share}))
     site.merged_into[absorbed] = survivor
@@ -66,7 +67,7 @@ def _accept(
 def _wait(site: SiteMap, candidates: list[Constraint], objection: str) -> None:
     """Join nothing yet, and let every candidate say what it waits for."""
     for c in candidates:
-        site.add_constraint(site.constraints[c.id].moved_to("candidate", objection))
+        site.add_constraint(site.constraints[c.id].moved_to("candidate", objection, site.now))
 
 
 def _candidates_between(site: SiteMap, a_root: int, b_root: int) -> list[Constraint]:
@@ -79,23 +80,9 @@ def _candidates_between(site: SiteMap, a_root: int, b_root: int) -> list[Constra
         if (ra, rb) == (a_root, b_root):
             found.append(c)
         elif (ra, rb) == (b_root, a_root):
-            found.append(_turned_round(c))
+            found.append(turned_round(c))
     found.sort(key=lambda c: (-c.evidence, c.id))
     return found[: site.config.join.most_candidates]
-
-
-def _turned_round(c: Constraint) -> Constraint:
-    # A tangent at b is -Ad(T_a_b) of itself at a: the information goes along.
-    A = c.T_a_b.inverse().adjoint()
-    return replace(
-        c,
-        keyframe_a=c.keyframe_b,
-        keyframe_b=c.keyframe_a,
-        T_a_b=c.T_a_b.inverse(),
-        information=A.T @ c.information @ A,
-        place_a=c.place_b,
-        place_b=c.place_a,
-    )
 
 
 def _best_sets(
@@ -174,5 +161,5 @@ def _drop_others(site: SiteMap, candidates: list[Constraint], chosen: list[Const
         if c.id not in kept:
             stored = site.constraints[c.id]
             site.add_constraint(
-                stored.moved_to("rejected", "contradicts the set that was accepted")
+                stored.moved_to("rejected", "contradicts the set that was accepted", site.now)
             )

@@ -6,10 +6,26 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from lineloom_core.features import ExtractionConfig, ScanFeatures, extract_features
 from lineloom_core.geometry import Pose
 from lineloom_core.matching.local_map import Cloud
 from lineloom_core.scan import Scan
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """How a keyframe was tracked from the one before it on its track.
+
+    T_previous_this; information: 3x3 in the tangent at this one; checks: the tracker's figures.
+    """
+
+    previous: int
+    T_previous_this: Pose
+    information: NDArray[np.float64]
+    checks: dict[str, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,6 +34,7 @@ class Keyframe:
 
     scan: counter-clockwise, mount inversion already undone. track: the run of tracking without a
     break that it belongs to. T_track_laser: where the tracker put it; the graph knows better.
+    step: None for the first of a track. version: number of the log entry that brought it.
     Features and cloud are functions of the scan; a snapshot leaves them out.
     """
 
@@ -26,6 +43,8 @@ class Keyframe:
     track: int
     scan: Scan
     T_track_laser: Pose
+    step: Step | None
+    version: int
     extraction: ExtractionConfig = field(repr=False)
 
     @cached_property

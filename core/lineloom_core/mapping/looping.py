@@ -10,6 +10,7 @@ import numpy as np
 
 from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.mapping.constraint import CONSTRAINT_FLOOR, Constraint
+from lineloom_core.mapping.refusals import refuse_barred
 from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.places import Place
 
@@ -24,13 +25,16 @@ def close_loops(site: SiteMap, place: Place) -> bool:
         and site.component_root(c.keyframe_a) == root
         and site.component_root(c.keyframe_b) == root
     ]
+    candidates = refuse_barred(site, candidates)
     moved = False
     for c in candidates:
         agreeing = [o for o in candidates if o.id != c.id and _loops_agree(site, c, o)]
         if _within_drift(site, c) and (agreeing or _small_step(site, c)):
             ids = tuple(sorted([c.id, *(o.id for o in agreeing)]))
             site.add_constraint(
-                c.moved_to("accepted", "within the drift and confirmed", consistency_set=ids)
+                c.moved_to(
+                    "accepted", "within the drift and confirmed", site.now, consistency_set=ids
+                )
             )
             moved = True
     if moved:
@@ -79,7 +83,7 @@ def _drop_contradicted(site: SiteMap, ids: list[str], root: int) -> None:
             continue
         off = _correction(site, c)
         if np.hypot(off.x, off.y) > 0.4 or abs(off.theta) > 0.1:
-            site.add_constraint(c.moved_to("rejected", "the graph contradicts it"))
+            site.add_constraint(c.moved_to("rejected", "the graph contradicts it", site.now))
             dropped = True
     if dropped:
         site.optimise(root)

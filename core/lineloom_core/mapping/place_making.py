@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from lineloom_core.mapping.config import PlaceConfig
 from lineloom_core.mapping.keyframe import Keyframe
-from lineloom_core.mapping.robot_record import Track
+from lineloom_core.mapping.track import Track
 from lineloom_core.places import Glimpse, Place
 
 
@@ -25,10 +25,11 @@ def recent_keyframes(track: Track, config: PlaceConfig) -> list[int]:
     return members
 
 
-def make_place(number: int, members: Sequence[int], keyframes: Mapping[int, Keyframe]) -> Place:
+def make_place(members: Sequence[int], keyframes: Mapping[int, Keyframe]) -> Place:
     """The place that consecutive keyframes of one track show, anchored at the middle one.
 
-    A function of the keyframes alone, so that a snapshot need not hold places.
+    A function of the keyframes alone, so that a snapshot need not hold places. Its id is that of
+    its last keyframe: the same however often the history is gone through.
     """
     anchor = keyframes[members[len(members) // 2]]
     glimpses = []
@@ -36,4 +37,4 @@ def make_place(number: int, members: Sequence[int], keyframes: Mapping[int, Keyf
         frame = keyframes[k]
         T_anchor_laser = anchor.T_track_laser.between(frame.T_track_laser)
         glimpses.append(Glimpse(k, frame.features, frame.cloud, T_anchor_laser))
-    return Place.of(number, anchor.track, anchor.id, glimpses)
+    return Place.of(members[-1], anchor.track, anchor.id, glimpses)

@@ -22,26 +22,16 @@ class PlacedScan:
 
 
 @dataclass
-class Track:
-    """A run of tracking without a break: its keyframes hang together by themselves."""
-
-    id: int
-    robot: str
-    keyframes: list[int] = field(default_factory=list)
-    travelled: list[float] = field(default_factory=list)
-    """Distance driven up to each keyframe [m]."""
-    last_place_at: float = 0.0
-    """Distance driven when the last place was made [m]."""
-
-
-@dataclass
 class RobotRecord:
     """Everything about a robot that its next scan depends on."""
 
     name: str
     mount: Mount = field(default_factory=Mount)
     tracker: Tracker | None = None
-    track: Track | None = None
+    track: int | None = None
+    """Number of the track that it is on."""
+    last_keyframe: int | None = None
+    """The track's latest."""
     state: RobotState = "starting"
     session: str | None = None
     sessions: dict[str, None] = field(default_factory=dict)

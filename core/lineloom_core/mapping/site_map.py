@@ -1,4 +1,7 @@
-"""The site's shared memory: keyframes, tracks, places, constraints and the graph over them."""
+"""What is believed of a site: keyframes seen so far, constraints, and the graph over them.
+
+A function of the history gone through so far and of the verdicts upon it: `rebuild` makes it anew.
+"""
 
 from __future__ import annotations
 
@@ -11,46 +14,102 @@ from numpy.typing import NDArray
 from lineloom_core.geometry import Pose
 from lineloom_core.graph import PoseGraph, optimize
 from lineloom_core.mapping.config import MapperConfig
-from lineloom_core.mapping.constraint import Constraint
+from lineloom_core.mapping.constraint import Constraint, step_id
 from lineloom_core.mapping.keyframe import Keyframe
+from lineloom_core.mapping.memory import Memory
 from lineloom_core.mapping.place_making import make_place
 from lineloom_core.mapping.positions import Positions
-from lineloom_core.mapping.robot_record import Track
+from lineloom_core.mapping.track import Track
+from lineloom_core.mapping.verdicts import Verdicts
 from lineloom_core.places import Place
 
 
 class SiteMap:
-    """Keyframes are numbered in the order they were made, tracks and places likewise."""
+    """Grows by one keyframe at a time (`append`); what follows from it is `advance`'s business."""
 
-    def __init__(self, config: MapperConfig) -> None:
+    def __init__(
+        self,
+        config: MapperConfig,
+        memory: Memory | None = None,
+        verdicts: Verdicts | None = None,
+    ) -> None:
         self.config = config
+        self.memory = memory or Memory(config.recognition)
+        self.verdicts = verdicts or Verdicts()
         self.keyframes: dict[int, Keyframe] = {}
-        self.tracks: dict[int, Track] = {}
+        self.tracks: dict[str, Track] = {}
         self.places: dict[int, Place] = {}
         self.constraints: dict[str, Constraint] = {}
         self.graph = PoseGraph()
         self.merged_into: dict[str, str] = {}
-        self.looped_tracks: dict[int, None] = {}
-        self.alias: dict[tuple[int, int], float] = {}
-        """By pair of places: how much of one could be mistaken for the other (`distinctive`)."""
+        self.looped_tracks: dict[str, None] = {}
+        self.unsolved: dict[int, int] = {}
+        """By component root: closures accepted since it was last solved."""
+        self.now = 0
+        """Version of the latest keyframe: when what is decided now is decided."""
+        self._track_of: dict[int, Track] = {}
         self._positions = Positions()
-        self._numbers = {"keyframe": 0, "track": 0, "place": 0, "constraint": 0}
 
     def __getstate__(self) -> dict[str, Any]:
         """Places are functions of their keyframes and by far the largest part: left out."""
-        return {**self.__dict__, "places": [(p.id, p.keyframes) for p in self.places.values()]}
+        return {**self.__dict__, "places": [p.keyframes for p in self.places.values()]}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        self.places = {
-            number: make_place(number, members, self.keyframes)
-            for number, members in state["places"]
-        }
+        self.places = {}
+        for members in state["places"]:
+            self.add_place(members)
 
-    def number(self, what: str) -> int:
-        """The next free number for a keyframe, track, place or constraint."""
-        self._numbers[what] += 1
-        return self._numbers[what] - 1
+    def append(self, keyframe: Keyframe) -> Constraint | None:
+        """Take the next keyframe of a track; return its step, None where a track begins.
+
+        A step that was retracted cuts the track: what follows is a component of its own.
+        """
+        self.keyframes[keyframe.id] = keyframe
+        self.now = keyframe.version
+        step = keyframe.step
+        if step is None or self.verdicts.barred(step_id(keyframe.id)):
+            name = str(keyframe.track) if step is None else f"{keyframe.track}.{keyframe.id}"
+            track = self.tracks[name] = Track(name, keyframe.robot)
+            track.append(keyframe.id, 0.0)
+            self._track_of[keyframe.id] = track
+            self.add_node(keyframe.id, Pose.identity())
+            return None
+        track = self._track_of[step.previous]
+        T = step.T_previous_this
+        track.append(keyframe.id, float(np.hypot(T.x, T.y)))
+        self._track_of[keyframe.id] = track
+        self.add_node(keyframe.id, self.pose(step.previous) @ T)
+        constraint = Constraint(
+            id=step_id(keyframe.id),
+            kind="sequential",
+            state="accepted",
+            keyframe_a=step.previous,
+            keyframe_b=keyframe.id,
+            T_a_b=T,
+            information=step.information,
+            reason="tracked from scan to scan",
+            checks=step.checks,
+        )
+        self.add_constraint(constraint)
+        return constraint
+
+    def add_place(self, members: tuple[int, ...]) -> Place:
+        """Add the place that these keyframes of one track show."""
+        place = self.memory.places.get(members[-1])
+        if place is None or place.keyframes != members:
+            place = make_place(members, self.keyframes)
+            self.memory.places[place.id] = place
+        self.places[place.id] = place
+        return place
+
+    def track(self, keyframe: int) -> Track:
+        """The track that a keyframe is on."""
+        return self._track_of[keyframe]
+
+    def same_track(self, a: int, b: int) -> bool:
+        """Whether tracking alone links two keyframes."""
+        return self._track_of[a] is self._track_of[b]
 
     def pose(self, keyframe: int) -> Pose:
         """T_map_laser of a keyframe in its component's frame, as the graph has it now."""
@@ -62,7 +121,7 @@ class SiteMap:
 
     def component_id(self, keyframe: int) -> str:
         """Stable id of the keyframe's component: that of its oldest track."""
-        return f"c{self.keyframes[self.component_root(keyframe)].track}"
+        return f"c{self._track_of[self.component_root(keyframe)].id}"
 
     def same_component(self, a: int, b: int) -> bool:
         """Whether the relative pose of two keyframes is known."""
@@ -76,16 +135,15 @@ class SiteMap:
         """
         straight = self.pose(a).distance(self.pose(b))
         around = 3.0 * straight + 5.0
-        ka, kb = self.keyframes[a], self.keyframes[b]
-        if ka.track != kb.track:
+        if not self.same_track(a, b):
             return around
         driven = self.driven_between(a, b)
-        return min(driven, around) if ka.track in self.looped_tracks else driven
+        return min(driven, around) if self._track_of[a].id in self.looped_tracks else driven
 
     def driven_between(self, a: int, b: int) -> float:
         """Metres driven from one keyframe to another of the same track."""
-        track = self.tracks[self.keyframes[a].track]
-        return abs(self._travelled(track, a) - self._travelled(track, b))
+        track = self._track_of[a]
+        return abs(_travelled(track, a) - _travelled(track, b))
 
     def drift(self, a: int, b: int) -> NDArray[np.float64]:
         """Covariance (3, 3) of T_a_b within one component, in the tangent at b."""
@@ -99,19 +157,17 @@ class SiteMap:
 
     def add_constraint(self, constraint: Constraint) -> None:
         """Remember a constraint; an accepted one goes into the graph."""
+        if not constraint.history:
+            constraint = constraint.moved_to(constraint.state, constraint.reason, self.now)
         self.constraints[constraint.id] = constraint
         in_graph = constraint.id in self.graph.edges
         if constraint.state == "accepted" and not in_graph:
             self.graph.add_edge(constraint.edge())
             if constraint.kind != "sequential":
                 for keyframe in (constraint.keyframe_a, constraint.keyframe_b):
-                    self.looped_tracks[self.keyframes[keyframe].track] = None
+                    self.looped_tracks[self._track_of[keyframe].id] = None
         elif constraint.state != "accepted" and in_graph:
             self.graph.remove_edge(constraint.id)
-
-    def new_constraint_id(self) -> str:
-        """The next constraint id."""
-        return f"k{self.number('constraint')}"
 
     def add_node(self, keyframe: int, pose: Pose) -> None:
         """Put a keyframe into the graph at T_map_laser."""
@@ -130,29 +186,6 @@ class SiteMap:
         self.graph.set_poses(solution.poses)
         self._positions.reset(self.graph.nodes)
 
-    def forget(self, robot: str) -> None:
-        """Remove a robot's keyframes, tracks and places, and every constraint that touches them."""
-        gone = {k.id for k in self.keyframes.values() if k.robot == robot}
-        for keyframe in sorted(gone):
-            self.graph.remove_node(keyframe)
-            del self.keyframes[keyframe]
-        self._positions.reset(self.graph.nodes)
-        self.tracks = {t.id: t for t in self.tracks.values() if t.robot != robot}
-        self.places = {p.id: p for p in self.places.values() if p.track in self.tracks}
-        self.alias = {
-            (a, b): e for (a, b), e in self.alias.items() if a in self.places and b in self.places
-        }
-        self.constraints = {
-            c.id: c
-            for c in self.constraints.values()
-            if c.keyframe_a not in gone and c.keyframe_b not in gone
-        }
-        self.looped_tracks = {t: None for t in self.looped_tracks if t in self.tracks}
-        alive = {self.component_id(k) for k in self.keyframes}
-        self.merged_into = {
-            a: b for a, b in self.merged_into.items() if a not in alive and b in alive
-        }
-
     def places_in_component(self, keyframe: int) -> int:
         """Number of places in the component of a keyframe."""
         root = self.component_root(keyframe)
@@ -169,13 +202,14 @@ class SiteMap:
 
     def neighbours_on_track(self, keyframe: int, reach: int) -> list[int]:
         """The keyframe and up to `reach` before and after it on its track, itself first."""
-        chain = self.tracks[self.keyframes[keyframe].track].keyframes
+        chain = self._track_of[keyframe].keyframes
         where = _position(chain, keyframe)
         around = chain[max(where - reach, 0) : where + reach + 1]
         return sorted(around, key=lambda k: (abs(_position(chain, k) - where), k))
 
-    def _travelled(self, track: Track, keyframe: int) -> float:
-        return track.travelled[_position(track.keyframes, keyframe)]
+
+def _travelled(track: Track, keyframe: int) -> float:
+    return track.travelled[_position(track.keyframes, keyframe)]
 
 
 def _position(chain: list[int], keyframe: int) -> int:

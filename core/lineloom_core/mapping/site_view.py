@@ -93,6 +93,15 @@ class KeyframeView:
     pose: Pose
 
 
+@dataclass(frozen=True, slots=True)
+class StateChange:
+    """When a constraint came into a state (`version`: log entries processed) and why."""
+
+    version: int
+    state: ConstraintState
+    reason: str
+
+
 @dataclass(frozen=True)
 class ConstraintView:
     """An edge of the pose graph and why it is what it is.
@@ -114,6 +123,7 @@ class ConstraintView:
     checks: dict[str, float] = field(default_factory=dict)
     consistency_set: tuple[str, ...] = ()
     residual: float | None = None
+    history: tuple[StateChange, ...] = ()
 
 
 @dataclass(frozen=True)

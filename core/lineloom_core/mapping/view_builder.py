@@ -128,7 +128,9 @@ def _keyframes(site: SiteMap, component_of: dict[int, str]) -> tuple[KeyframeVie
 
 
 def _constraints(site: SiteMap) -> tuple[ConstraintView, ...]:
+    """All constraints; what is barred is not in the map, but must be there to be restored."""
     residuals = site.graph.residuals()
+    known = {**site.constraints, **{c.id: c for c in site.verdicts.all_barred()}}
     return tuple(
         ConstraintView(
             id=c.id,
@@ -142,8 +144,9 @@ def _constraints(site: SiteMap) -> tuple[ConstraintView, ...]:
             checks=dict(c.checks),
             consistency_set=c.consistency_set,
             residual=residuals.get(c.id),
+            history=c.history,
         )
-        for c in site.constraints.values()
+        for c in known.values()
     )
 
 

@@ -5,6 +5,8 @@ from lineloom_core.places.recognition import (
     Recognition,
     RecognitionConfig,
     alias_evidence,
+    evidence_elsewhere,
+    hypotheses,
     recognise,
 )
 
@@ -15,5 +17,7 @@ __all__ = [
     "RecognitionConfig",
     "alias_evidence",
     "count_points",
+    "evidence_elsewhere",
+    "hypotheses",
     "recognise",
 ]

@@ -66,16 +66,20 @@ class Recognition:
     checks: dict[str, float] = field(default_factory=dict)
 
 
+NOTHING_IN_COMMON = Recognition(False, None, np.zeros((3, 3)), "too little in common", 0.0)
+"""The outcome for most pairs: no hypothesis at all."""
+
+
 def recognise(
     reference: Place, current: Place, config: RecognitionConfig | None = None
 ) -> Recognition:
     """Match two places without any pose and judge the best hypothesis."""
     config = config or RecognitionConfig()
-    table = _hypotheses(reference, current, config)
+    table = hypotheses(reference, current, config)
     if len(table) == 0:
-        return _refused("too little in common")
+        return NOTHING_IN_COMMON
     if _kernels.place_evidence(table[0, 5], table[0, 6], table[0, 9]) < config.least_overlap:
-        return _refused("too little in common")
+        return NOTHING_IN_COMMON
     registered = reference.local_map.register(
         current.surface, Pose.from_array(table[0, :3]), gate=0.3, sigma=0.04
     )
@@ -83,7 +87,7 @@ def recognise(
     checks["overlap"] = float(table[0, 9])
     evidence = _kernels.place_evidence(checks["matched"], checks["conflict"], table[0, 9])
     checks["evidence"] = evidence
-    rival = _best_elsewhere(table, registered.pose, config)
+    rival = evidence_elsewhere(table, registered.pose, config)
     checks["margin"] = 1.0 - rival / evidence if evidence > 0.0 else 0.0
     checks["own_conflict"] = reference.own_conflict + current.own_conflict
     reason = _objection(checks, config)
@@ -112,12 +116,15 @@ def alias_evidence(
     same turned round, or a corridor like the next one, proves little when it is seen again.
     """
     config = config or RecognitionConfig()
-    table = _hypotheses(reference, current, config)
-    return _best_elsewhere(table, T_reference_current, config, slack=uncertainty)
+    table = hypotheses(reference, current, config)
+    return evidence_elsewhere(table, T_reference_current, config, slack=uncertainty)
 
 
-def _hypotheses(reference: Place, current: Place, config: RecognitionConfig) -> NDArray[np.float64]:
-    """Refined hypotheses, best first (see `_kernels.match_places`)."""
+def hypotheses(
+    reference: Place, current: Place, config: RecognitionConfig | None = None
+) -> NDArray[np.float64]:
+    """Refined hypotheses (n, 10), best first: x, y, theta and figures (`_kernels.match_places`)."""
+    config = config or RecognitionConfig()
     if len(reference.lines) < 2 or len(current.lines) < 2:
         return np.empty((0, 10))
     table: NDArray[np.float64] = _kernels.match_places(
@@ -146,8 +153,8 @@ def check_alignment(reference: Place, current: Place, registered: Registration) 
     }
 
 
-def _best_elsewhere(
-    table: NDArray[np.float64], pose: Pose, config: RecognitionConfig, slack: float = 0.0
+def evidence_elsewhere(
+    table: NDArray[np.float64], pose: Pose, config: RecognitionConfig, *, slack: float = 0.0
 ) -> float:
     """Evidence of the best hypothesis that is another relative pose than `pose`."""
     best = 0.0
@@ -173,7 +180,3 @@ def _objection(checks: dict[str, float], config: RecognitionConfig) -> str:
     if checks["information"] < config.least_information:
         return "the position along one direction is not determined"
     return ""
-
-
-def _refused(reason: str) -> Recognition:
-    return Recognition(False, None, np.zeros((3, 3)), reason, 0.0)

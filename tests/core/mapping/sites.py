@@ -9,10 +9,9 @@ import numpy as np
 from lineloom_core.features import ExtractionConfig
 from lineloom_core.geometry import Pose
 from lineloom_core.mapping.constraint import Constraint, step_information
-from lineloom_core.mapping.keyframe import Keyframe
-from lineloom_core.mapping.robot_record import Track
+from lineloom_core.mapping.keyframe import Keyframe, Step
 from lineloom_core.mapping.site_map import SiteMap
-from lineloom_core.places import Glimpse, Place
+from lineloom_core.places import Place
 from lineloom_core.simulation import SimulatedScan
 from numpy.typing import NDArray
 
@@ -31,34 +30,30 @@ def lay_track(
     component's frame.
     """
     begin = begin or Pose.identity()
+    track = len(site.tracks)
     if poses is None:
         poses = [scans[0].true_pose.between(s.true_pose) for s in scans]
-    track = Track(site.number("track"), robot)
-    site.tracks[track.id] = track
-    for simulated, pose in zip(scans, poses, strict=True):
-        frame = Keyframe(
-            id=site.number("keyframe"),
-            robot=robot,
-            track=track.id,
-            scan=simulated.scan,
-            T_track_laser=pose,
-            extraction=ExtractionConfig(),
+    first = len(site.keyframes)
+    for number, (simulated, pose) in enumerate(zip(scans, poses, strict=True), start=first):
+        step = None
+        if number > first:
+            T = poses[number - 1 - first].between(pose)
+            information = step_information(np.diag([1e6, 1e6, 1e7]), (0.15, 0.05))
+            step = Step(number - 1, T, information, {})
+        site.append(
+            Keyframe(
+                id=number,
+                robot=robot,
+                track=track,
+                scan=simulated.scan,
+                T_track_laser=pose,
+                step=step,
+                version=number + 1,
+                extraction=ExtractionConfig(),
+            )
         )
-        site.keyframes[frame.id] = frame
-        site.add_node(frame.id, begin @ pose)
-        _append(site, track, frame)
-    return list(track.keyframes)
-
-
-def _append(site: SiteMap, track: Track, frame: Keyframe) -> None:
-    if not track.keyframes:
-        track.travelled.append(0.0)
-    else:
-        last = site.keyframes[track.keyframes[-1]]
-        T_last_new = last.T_track_laser.between(frame.T_track_laser)
-        track.travelled.append(track.travelled[-1] + np.hypot(T_last_new.x, T_last_new.y))
-        link(site, last.id, frame.id, T_last_new, kind="sequential", state="accepted")
-    track.keyframes.append(frame.id)
+    site.move_component(first, begin)
+    return list(range(first, first + len(scans)))
 
 
 def link(
@@ -75,7 +70,7 @@ def link(
 ) -> Constraint:
     """Add a constraint between two keyframes."""
     made = Constraint(
-        id=site.new_constraint_id(),
+        id=f"t{len(site.constraints)}",
         kind=kind,  # type: ignore[arg-type]
         state=state,  # type: ignore[arg-type]
         keyframe_a=a,
@@ -95,18 +90,10 @@ def link(
 
 def lay_places(site: SiteMap, keyframes: Sequence[int], size: int = 8) -> list[Place]:
     """Cut a track into places of `size` keyframes, half of them shared with the next place."""
-    made = []
-    for begin in range(0, len(keyframes) - size + 1, size // 2):
-        members = [site.keyframes[k] for k in keyframes[begin : begin + size]]
-        anchor = members[size // 2]
-        glimpses = [
-            Glimpse(k.id, k.features, k.cloud, anchor.T_track_laser.between(k.T_track_laser))
-            for k in members
-        ]
-        place = Place.of(site.number("place"), anchor.track, anchor.id, glimpses)
-        site.places[place.id] = place
-        made.append(place)
-    return made
+    return [
+        site.add_place(tuple(keyframes[begin : begin + size]))
+        for begin in range(0, len(keyframes) - size + 1, size // 2)
+    ]
 
 
 def thinned(scans: Sequence[SimulatedScan], step: float = 0.4) -> list[SimulatedScan]:

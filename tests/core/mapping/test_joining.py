@@ -113,8 +113,8 @@ def test_fewer_than_three_join_nothing(meeting: Meeting, count: int) -> None:
 
 def test_three_on_one_place_are_one_witness(meeting: Meeting) -> None:
     first = meeting.candidate(0)
-    for _ in range(3):
-        again = replace(first, id=meeting.site.new_constraint_id())
+    for number in range(3):
+        again = replace(first, id=f"again-{number}")
         meeting.site.add_constraint(again)
     assert meeting.join() is None
     assert said(meeting) == {"all constraints rest on one place"}
@@ -178,16 +178,17 @@ def test_a_story_that_puts_walls_into_free_space_is_refused(meeting: Meeting, T:
     assert not meeting.site.same_component(meeting.a[0], meeting.b[0])
 
 
-def test_places_that_look_like_others_nearby_prove_nothing(meeting: Meeting) -> None:
+def test_places_that_look_like_others_nearby_prove_nothing(
+    meeting: Meeting, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for i in spread(meeting, 4):
         meeting.candidate(i)
-    for a in meeting.places_a[:2]:  # as if each looked just like every other one of its robot
-        for other in meeting.places_a:
-            meeting.site.alias[min(a.id, other.id), max(a.id, other.id)] = STRONG
-    for place in meeting.places_a[2:]:
-        meeting.site.alias[meeting.places_a[0].id, place.id] = STRONG
-        meeting.site.alias[place.id, place.id] = STRONG
+    elsewhere = np.zeros((1, 10))  # as if each were found elsewhere, with as much evidence
+    elsewhere[0, :3] = 100.0, 100.0, 2.0
+    elsewhere[0, 9] = STRONG
+    monkeypatch.setattr(meeting.site.memory, "hypotheses", lambda a, b: elsewhere)
     assert meeting.join() is None
+    assert said(meeting) == {"the places look like others of the same robots"}
 
 
 def test_a_candidate_says_the_same_from_either_end(

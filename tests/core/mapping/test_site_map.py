@@ -12,7 +12,7 @@ from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.simulation import SimulatedScan, rectangle
 
 from tests.core.mapping.drives import legs, scans_of
-from tests.core.mapping.sites import lay_places, lay_track, link, thinned
+from tests.core.mapping.sites import lay_track, link, thinned
 
 
 @pytest.fixture(scope="module")
@@ -115,33 +115,3 @@ def test_optimising_pulls_a_bent_track_straight_and_keeps_the_anchor(
     site.optimise(ids[4])
     assert site.pose(ids[0]) == Pose.identity()
     assert site.pose(ids[-1]).distance(true[-1]) < 0.2 * off_before
-
-
-def test_forgetting_a_robot_leaves_nothing_of_it(site: SiteMap, loop: list[SimulatedScan]) -> None:
-    a = lay_track(site, loop[:17], robot="a")
-    b = lay_track(site, loop[:17], robot="b")
-    c = lay_track(site, loop[:17], robot="c")
-    for ids in (a, b, c):
-        lay_places(site, ids)
-    link(site, a[3], b[3], Pose.identity(), state="accepted")
-    link(site, b[5], c[5], Pose.identity(), state="accepted")
-    site.merged_into.update({"c1": "c0", "c2": "c0"})
-    poses = {k: site.pose(k) for k in a + c}
-    site.forget("b")
-    assert {k.robot for k in site.keyframes.values()} == {"a", "c"}
-    assert set(site.graph.nodes) == set(a + c) == set(site.keyframes)
-    assert all({x.keyframe_a, x.keyframe_b} <= set(a + c) for x in site.constraints.values())
-    assert {p.track for p in site.places.values()} == {0, 2}
-    assert not site.same_component(a[0], c[0])
-    assert site.component_id(c[0]) == "c2"
-    assert "c2" not in site.merged_into  # it stands alone again
-    assert set(site.merged_into.values()) <= {"c0"}
-    assert {k: site.pose(k) for k in a + c} == poses
-    assert site.number("keyframe") == len(a + b + c)  # numbers are never given twice
-
-
-def test_forgetting_nobody_changes_nothing(site: SiteMap, loop: list[SimulatedScan]) -> None:
-    ids = lay_track(site, loop[:8], robot="a")
-    site.forget("nobody")
-    assert list(site.keyframes) == ids
-    assert len(site.constraints) == 7

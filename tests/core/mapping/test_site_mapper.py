@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 import subprocess
 import sys
@@ -35,7 +36,7 @@ def digest_elsewhere(snapshot: bytes, rest: list[SimulatedScan], hash_seed: int)
         [sys.executable, "-c", GO_ON, str(root)],
         input=pickle.dumps((snapshot, rest)),
         stdout=subprocess.PIPE,
-        env={"PYTHONHASHSEED": str(hash_seed)},
+        env={**os.environ, "PYTHONHASHSEED": str(hash_seed)},
         check=True,
     )
     return done.stdout.decode().strip()
