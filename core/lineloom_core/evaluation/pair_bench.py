@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
@@ -80,14 +80,19 @@ class _Answer:
     match_s: float
 
 
+OnAnswers = Callable[[str, BenchSet, Sequence[MatchResult]], None]
+"""Called with who answered, the set, and an answer per pair."""
+
+
 def run_pair_bench(
     contestants: Iterable[Contestant],
     sets: Sequence[BenchSet],
     on_progress: Callable[[str], None] = lambda _: None,
+    on_answers: OnAnswers = lambda *_: None,
 ) -> tuple[BenchRow, ...]:
     """Run every contestant over every set, from each of its starts; tell who is at work."""
     with _one_core():
-        return tuple(row for c in contestants for row in _run_one(c, sets, on_progress))
+        return tuple(row for c in contestants for row in _run_one(c, sets, on_progress, on_answers))
 
 
 @contextmanager
@@ -134,7 +139,10 @@ def figures_of(
 
 
 def _run_one(
-    contestant: Contestant, sets: Sequence[BenchSet], on_progress: Callable[[str], None]
+    contestant: Contestant,
+    sets: Sequence[BenchSet],
+    on_progress: Callable[[str], None],
+    on_answers: OnAnswers,
 ) -> Iterator[BenchRow]:
     try:
         matcher = contestant.make()
@@ -143,14 +151,24 @@ def _run_one(
             yield BenchRow(contestant.name, contestant.kind, start, {}, {}, str(error))
         return
     for start in contestant.starts:
-        on_progress(contestant.name + (f" from {start}" if start != "none" else ""))
-        yield _run(contestant, matcher, start, sets)
+        label = contestant.name + (f" from {start}" if start != "none" else "")
+        on_progress(label)
+        by_set = {s.name: _answers(matcher, start, s) for s in sets}
+        for s in sets:
+            on_answers(label, s, [a.result for a in by_set[s.name]])
+        yield _row(contestant, start, sets, by_set)
 
 
-def _run(
-    contestant: Contestant, matcher: Matcher[Any], start: Start, sets: Sequence[BenchSet]
+def _answers(matcher: Matcher[Any], start: Start, pairs: BenchSet) -> list[_Answer]:
+    return [_answer(matcher, start, row) for row in _warmed(pairs.pairs)][1:]
+
+
+def _row(
+    contestant: Contestant,
+    start: Start,
+    sets: Sequence[BenchSet],
+    by_set: Mapping[str, list[_Answer]],
 ) -> BenchRow:
-    by_set = {s.name: [_answer(matcher, start, row) for row in _warmed(s.pairs)][1:] for s in sets}
     collections: dict[str, list[_Answer]] = {}
     for s in sets:
         collections.setdefault(s.collection, []).extend(by_set[s.name])

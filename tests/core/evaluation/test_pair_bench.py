@@ -256,3 +256,10 @@ def test_the_command_says_what_is_wrong(tmp_path: Path) -> None:
         assert told in result.stderr.replace("\n", " ")
     np.savez(tmp_path / "other.npz", reference=np.zeros(3))
     assert "is no file of pairs" in run("--data", str(tmp_path)).stderr.replace("\n", " ")
+
+
+def test_the_command_draws_the_worst_answers(tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "worst"
+    result = run("--matchers", "point-to-line", "--simulated", "2", "--worst", str(folder))
+    assert result.exit_code == 0, result.output
+    assert (folder / "worst-point-to-line-from-identity-simulated-180.png").exists()

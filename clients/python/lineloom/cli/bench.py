@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,6 +16,8 @@ from lineloom.cli.failure import CommandError, Exit
 if TYPE_CHECKING:
     from lineloom_core.evaluation.pair_bench_contestants import Contestant
     from lineloom_core.evaluation.pair_bench_sets import BenchSet
+    from lineloom_core.experiments.worst_answers import BadAnswer
+    from lineloom_core.matching import MatchResult
 
 SHARED_PAIRS = Path(__file__).resolve().parents[5] / "shared" / "data" / "pairs"
 """Where the real pairs lie beside a checkout: `../shared/data/pairs` from the project's root."""
@@ -60,6 +63,13 @@ def pairs(
         int | None,
         typer.Option(min=1, metavar="N", help="At most so many pairs of each tier and overlap."),
     ] = None,
+    worst: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Draw each matcher's ten worst answers per collection into this folder.",
+        ),
+    ] = None,
     json: options.Json = False,
 ) -> None:
     """Run matchers over scan pairs whose true pose is known: how often right, how sure, how fast.
@@ -72,6 +82,7 @@ def pairs(
     Example:
       lineloom bench pairs --limit 10
       lineloom bench pairs --matchers lineloom,baselines --simulated 0 --json
+      lineloom bench pairs --matchers lineloom --worst out/worst
     """
     for variable in _ONE_THREAD:
         # Before the core is loaded: threads that wait for work would count as CPU time.
@@ -85,11 +96,44 @@ def pairs(
         ) from None
     contestants = _contestants(matchers)
     sets = _sets(data, simulated, limit)
-    rows = run_pair_bench(contestants, sets, note)
+    album = _Album(worst)
+    rows = run_pair_bench(contestants, sets, note, album.add)
+    album.save()
     if json:
         print_json(to_json(rows, sets))
     else:
         out.print(to_markdown(rows, sets), markup=False, soft_wrap=True)
+
+
+class _Album:
+    """Gathers wrong answers and draws the worst; does nothing without a folder."""
+
+    def __init__(self, folder: Path | None) -> None:
+        self._folder = folder
+        self._bad: dict[str, list[BadAnswer]] = {}
+
+    def add(self, who: str, pairs: BenchSet, results: Sequence[MatchResult]) -> None:
+        """Keep what `who` got wrong in one set."""
+        from lineloom_core.experiments.worst_answers import bad_answers
+
+        if self._folder is not None:
+            name = f"{who}-{pairs.collection}".replace(" ", "-")
+            self._bad.setdefault(name, []).extend(bad_answers(pairs.name, pairs.pairs, results))
+
+    def save(self) -> None:
+        """Write one figure per matcher and collection, PNG and SVG, and say where."""
+        from lineloom_core.experiments.worst_answers import worst_answers
+
+        if self._folder is None:
+            return
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            for name, bad in self._bad.items():
+                figure = worst_answers(f"worst-{name}", bad)
+                if figure is not None:
+                    note(f"wrote {figure.save(self._folder)[1]}")
+        except OSError as error:
+            raise CommandError(f"--worst: {error}") from None
 
 
 def _contestants(names: str) -> tuple[Contestant, ...]:
