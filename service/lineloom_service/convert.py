@@ -1,4 +1,6 @@
-"""Between the contract's models and the core's types: the only file that knows both."""
+"""Between the contract's models and the core's types: the only file that knows both,
+but for the events of `events/difference.py`.
+"""
 
 from __future__ import annotations
 
@@ -83,7 +85,7 @@ def to_robot(site: str, record: RobotRecord, view: SiteView, skips: Iterable[Ski
         robot=record.name,
         site=site,
         component=None if seen is None else seen.component,
-        pose=None if seen is None else _uncertain_pose(seen),
+        pose=None if seen is None else to_uncertain_pose(seen),
         state="starting" if seen is None else seen.state,
         scans=_counts(record.accepted, processed, skipped_scans),
         keyframes=0 if seen is None else seen.keyframes,
@@ -93,6 +95,15 @@ def to_robot(site: str, record: RobotRecord, view: SiteView, skips: Iterable[Ski
         mount=None if record.mount is None else _mount(decode_mount(record.mount)),
         health=health,
     )
+
+
+def to_uncertain_pose(robot: RobotView) -> wire.UncertainPose | None:
+    """Return a robot's pose, None before its first scan is placed."""
+    if robot.pose is None:
+        return None
+    covariance = None if robot.covariance is None else _matrix(robot.covariance)
+    pose = robot.pose
+    return wire.UncertainPose(x=pose.x, y=pose.y, theta=pose.theta, covariance=covariance)
 
 
 def to_trajectory(robot: str, view: SiteView) -> wire.Trajectory:
@@ -244,14 +255,6 @@ def _describe_skip(skip: Skip) -> str:
 
 def _pose(pose: Pose) -> wire.PoseAnswer:
     return wire.PoseAnswer(x=pose.x, y=pose.y, theta=pose.theta)
-
-
-def _uncertain_pose(robot: RobotView) -> wire.UncertainPose | None:
-    if robot.pose is None:
-        return None
-    covariance = None if robot.covariance is None else _matrix(robot.covariance)
-    pose = robot.pose
-    return wire.UncertainPose(x=pose.x, y=pose.y, theta=pose.theta, covariance=covariance)
 
 
 def _mount(mount: Mount) -> wire.MountSettings:

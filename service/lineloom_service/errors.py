@@ -48,6 +48,7 @@ UNKNOWN_FORMAT = Kind("unknown-format", 422, "This format is not available")
 BACKLOG_FULL = Kind("backlog-full", 429, "The site has too many scans waiting")
 INTERNAL = Kind("internal", 500, "The service failed")
 NOT_READY = Kind("not-ready", 503, "The service is not ready yet")
+TOO_MANY_STREAMS = Kind("too-many-streams", 503, "Too many listeners already")
 STORAGE = Kind("storage", 503, "The storage failed")
 _OTHER = Kind("http", 400, "The request was refused")
 

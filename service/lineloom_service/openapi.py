@@ -10,7 +10,14 @@ from lineloom import wire
 from pydantic.json_schema import models_json_schema
 
 _SCHEMAS = "#/components/schemas/"
-_BODIES = (wire.Scan, wire.ScanBatch, wire.RobotSettings, wire.MatchRequest, wire.Problem)
+_MODELS = (
+    wire.Scan,
+    wire.ScanBatch,
+    wire.RobotSettings,
+    wire.MatchRequest,
+    wire.Problem,
+    wire.Event,
+)
 _DESCRIPTION = """\
 Scans of 2D lidars in, one merged line map out, no poses needed.
 
@@ -43,6 +50,16 @@ def also_as(*media_types: str) -> dict[int | str, dict[str, Any]]:
     return {200: {"content": {media_type: {} for media_type in media_types}}}
 
 
+def events_of(model: str) -> dict[int | str, dict[str, Any]]:
+    """Return the description of a stream whose events' `data` is this model."""
+    schema = {"type": "string", "contentMediaType": "application/json"}
+    description = f"Server-Sent Events; the `data` of each is JSON, see `{model}`."
+    content = {
+        "text/event-stream": {"schema": {**schema, "contentSchema": {"$ref": _SCHEMAS + model}}}
+    }
+    return {200: {"description": description, "content": content}}
+
+
 def install(app: FastAPI) -> None:
     """Have the app describe itself completely."""
 
@@ -55,7 +72,7 @@ def install(app: FastAPI) -> None:
                 routes=app.routes,
             )
             _, extra = models_json_schema(
-                [(model, "validation") for model in _BODIES], ref_template=_SCHEMAS + "{model}"
+                [(model, "validation") for model in _MODELS], ref_template=_SCHEMAS + "{model}"
             )
             schemas = document.setdefault("components", {}).setdefault("schemas", {})
             schemas.update(extra["$defs"])

@@ -5,9 +5,13 @@ from __future__ import annotations
 import asyncio
 import logging
 
+import lineloom_core
+
 from lineloom_service.engine.conductor import Conductor
 from lineloom_service.engine.local_engine import LocalEngine
 from lineloom_service.engine.protocol import Engine
+from lineloom_service.events.hub import EventHub
+from lineloom_service.events.recorder import EventRecorder
 from lineloom_service.matching import PairMatcher
 from lineloom_service.settings import Settings
 from lineloom_service.store.protocol import Store
@@ -31,7 +35,12 @@ class Service:
         self.engine: Engine = engine or LocalEngine(
             settings.workers, publish_every_s=settings.publish_every_s
         )
-        self.conductor = Conductor(self.store, self.engine, settings)
+        self.events = EventHub()
+        self.event_streams = 0
+        recorder = EventRecorder(
+            self.store, self.events, lineloom_core.__version__, settings.event_history
+        )
+        self.conductor = Conductor(self.store, self.engine, settings, recorder)
         self.matcher = PairMatcher()
         self._warming: asyncio.Task[None] | None = None
 

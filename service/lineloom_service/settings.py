@@ -56,6 +56,19 @@ class Settings(BaseSettings):
         default=10.0, ge=0.0, description="Time for last snapshots when the service stops."
     )
 
+    event_history: int = Field(
+        default=5_000, ge=1, description="Published views of a site whose events are kept."
+    )
+    event_streams: int = Field(
+        default=256, ge=1, description="Listeners to events at a time; more are answered 503."
+    )
+    heartbeat_s: float = Field(
+        default=15.0, gt=0.0, description="A listener to events hears something this often."
+    )
+    slow_reader_s: float = Field(
+        default=20.0, gt=0.0, description="A client that reads nothing for this long is dropped."
+    )
+
     @property
     def database_path(self) -> Path:
         """The SQLite file."""

@@ -157,6 +157,13 @@ def constraints(
     return Call("GET", f"{_site(site)}/constraints", _model(ConstraintPage), params=params)
 
 
+def events(site: str, follow: bool) -> Call[None]:
+    """GET the stream of a site's events; `event_stream` reads it."""
+    headers = {"Accept": "text/event-stream", "Cache-Control": "no-store"}
+    params = {} if follow else {"follow": "false"}
+    return Call("GET", f"{_site(site)}/events", lambda _: None, params=params, headers=headers)
+
+
 def match(reference: ScanLike, current: ScanLike) -> Call[MatchAnswer]:
     """POST two scans, to learn how they lie to each other."""
     request = MatchRequest.model_construct(

@@ -9,13 +9,14 @@ from typing import Literal, Self, TypeVar
 
 import httpx
 
-from lineloom import calls
+from lineloom import calls, event_stream
 from lineloom.calls import Box, Call, Encoding, MapFormat
 from lineloom.errors import ConnectionFailedError
 from lineloom.retry import RetryPolicy
 from lineloom.scan_like import ScanLike, batches
 from lineloom.session import DEFAULT_BATCH, BatchTotal, Session, not_idle, not_ready
 from lineloom.wire import (
+    AnyEvent,
     Constraint,
     ConstraintPage,
     Graph,
@@ -174,6 +175,17 @@ class Client:
     def match(self, reference: ScanLike, current: ScanLike) -> MatchAnswer:
         """Return where `current` was taken, seen from `reference`; adds nothing to any map."""
         return self._send(calls.match(reference, current))
+
+    def events(
+        self, site: str, *, last_event_id: str | None = None, until_now: bool = False
+    ) -> Iterator[AnyEvent]:
+        """Yield what happens to a site from now on, or after the event `last_event_id`.
+
+        Goes on by itself across lost connections and restarts of the service, missing nothing; a
+        `reset` event says where that was not possible. Ends with what there is so far where
+        `until_now`; else raises once the site is gone or the service stays away.
+        """
+        return event_stream.follow(self._http, self.session, site, last_event_id, until_now)
 
     # Wait
 

@@ -9,7 +9,7 @@ import logging
 import lineloom_core
 from lineloom_core.mapping.site_view import SiteView
 
-from lineloom_service.engine.protocol import Engine
+from lineloom_service.engine.protocol import Engine, Recorder
 from lineloom_service.engine.site_runner import Pace, Published, SiteRunner
 from lineloom_service.settings import Settings
 from lineloom_service.store.protocol import Store
@@ -34,9 +34,16 @@ NOTHING = Published(0, 0, 0, EMPTY_VIEW)
 class Conductor:
     """One SiteRunner per site, and the latest view of each for the queries."""
 
-    def __init__(self, store: Store, engine: Engine, settings: Settings) -> None:
+    def __init__(
+        self,
+        store: Store,
+        engine: Engine,
+        settings: Settings,
+        recorder: Recorder | None = None,
+    ) -> None:
         self._store = store
         self._engine = engine
+        self._recorder = recorder
         self._pace = Pace(settings.chunk, settings.snapshot_every, settings.snapshot_idle_s)
         self._stop_grace_s = settings.stop_grace_s
         self._runners: dict[int, SiteRunner] = {}
@@ -64,6 +71,8 @@ class Conductor:
             for saving in late:
                 saving.cancel()
             await asyncio.gather(*savings, return_exceptions=True)
+        if self._recorder is not None:
+            await self._recorder.stop()
         await self._engine.stop()
 
     def published(self, site_id: int) -> Published:
@@ -90,10 +99,17 @@ class Conductor:
             with contextlib.suppress(asyncio.CancelledError):
                 await task
         self._engine.stop_site(site_id)
+        if self._recorder is not None:
+            self._recorder.forget_site(site_id)
 
     def _runner(self, record: SiteRecord) -> SiteRunner:
         runner = SiteRunner(
-            record, self._store, self._engine, self._pace, lineloom_core.__version__
+            record,
+            self._store,
+            self._engine,
+            self._pace,
+            lineloom_core.__version__,
+            self._recorder,
         )
         self._runners[record.id] = runner
         task = asyncio.create_task(runner.run(), name=f"site-{record.name}")

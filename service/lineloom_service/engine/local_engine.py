@@ -128,11 +128,18 @@ class LocalEngine:
         await self._ask(hosted, StartSite(site, hosted.run, position, snapshot))
 
     def feed(
-        self, site: int, entries: Sequence[LogEntry], through: int, *, caught_up: bool
+        self,
+        site: int,
+        entries: Sequence[LogEntry],
+        through: int,
+        *,
+        caught_up: bool,
+        publish: bool = False,
     ) -> Awaitable[bytes]:
         """Send entries to the site's worker."""
         hosted = self._sites[site]
-        return self._ask(hosted, Feed(site, hosted.run, tuple(entries), through, caught_up))
+        order = Feed(site, hosted.run, tuple(entries), through, caught_up, publish)
+        return self._ask(hosted, order)
 
     async def snapshot(self, site: int) -> bytes:
         """Ask the site's worker for the mapper's state."""

@@ -25,13 +25,14 @@ class StartSite:
 
 @dataclass(frozen=True, slots=True)
 class Feed:
-    """Map these entries; afterwards the site is at `through`."""
+    """Map these entries; afterwards the site is at `through`. publish: show the map right then."""
 
     site: int
     run: int
     entries: tuple[LogEntry, ...]
     through: int
     caught_up: bool
+    publish: bool = False
 
 
 @dataclass(frozen=True, slots=True)

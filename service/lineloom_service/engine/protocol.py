@@ -70,12 +70,19 @@ class Engine(Protocol):
         ...
 
     def feed(
-        self, site: int, entries: Sequence[LogEntry], through: int, *, caught_up: bool
+        self,
+        site: int,
+        entries: Sequence[LogEntry],
+        through: int,
+        *,
+        caught_up: bool,
+        publish: bool = False,
     ) -> Awaitable[object]:
         """Send entries; what is returned is done when the mapper is through all of them.
 
         through: the position after them, which may be that of an entry left out. caught_up: there
-        are no more for now. Several feeds may be under way. Raises MapperFailedError.
+        are no more for now. publish: the view at `through` comes before it is done, whatever the
+        pace. Several feeds may be under way. Raises MapperFailedError.
         """
         ...
 
@@ -85,4 +92,31 @@ class Engine(Protocol):
 
     def stop_site(self, site: int) -> None:
         """Host a site no longer."""
+        ...
+
+
+class Recorder(Protocol):
+    """Keeps what published views tell, beside the mapping."""
+
+    async def recorded_position(self, site_id: int) -> int:
+        """Return the position up to which a site is recorded: its view there has to be published.
+
+        Asked before a site is mapped.
+        """
+        ...
+
+    def on_view(self, site_id: int, position: int, view: SiteView) -> None:
+        """Take a published view; never waits."""
+        ...
+
+    async def settled(self, site_id: int) -> None:
+        """Wait until what was taken is durable, within bounds."""
+        ...
+
+    def forget_site(self, site_id: int) -> None:
+        """A site was deleted."""
+        ...
+
+    async def stop(self) -> None:
+        """Finish."""
         ...

@@ -12,6 +12,7 @@ from lineloom_core.mapping.site_view import SiteView
 from lineloom_service.engine.protocol import (
     Engine,
     MapperFailedError,
+    Recorder,
     RestoreFailedError,
     WorkerDiedError,
 )
@@ -60,7 +61,13 @@ class SiteRunner:
     """Feeds one site for as long as its task runs."""
 
     def __init__(
-        self, record: SiteRecord, store: Store, engine: Engine, pace: Pace, producer: str
+        self,
+        record: SiteRecord,
+        store: Store,
+        engine: Engine,
+        pace: Pace,
+        producer: str,
+        recorder: Recorder | None = None,
     ) -> None:
         self.site = record.id
         self.name = record.name
@@ -72,6 +79,8 @@ class SiteRunner:
         self._engine = engine
         self._pace = pace
         self._producer = producer
+        self._recorder = recorder
+        self._recorded = 0
         self._wake = asyncio.Event()
         self._strikes: Counter[int] = Counter()
         self._sent = self._done = self._saved = 0
@@ -93,6 +102,8 @@ class SiteRunner:
         skipped = sum(s.kind == "scan" for s in self.skips.values() if s.position <= position)
         self.published = Published(position, scans, skipped, view)
         self._marks = {at: n for at, n in self._marks.items() if at >= position}
+        if self._recorder is not None:
+            self._recorder.on_view(self.site, position, view)
 
     async def run(self) -> None:
         """Keep the site hosted and fed, whatever happens to its worker."""
@@ -116,6 +127,12 @@ class SiteRunner:
         """Save a snapshot if anything was mapped since the last one. Nothing may be under way."""
         if self._done == self._saved:
             return
+        if self._recorder is not None:
+            # Events are never behind the snapshots: a restart finds the view they go on from.
+            await self._engine.feed(
+                self.site, [], self._done, caught_up=self._done >= self._end, publish=True
+            )
+            await self._recorder.settled(self.site)
         data = await self._engine.snapshot(self.site)
         record = SnapshotRecord(self._done, self._scans_done, self._producer, data)
         await self._store.save_snapshot(self.site, record)
@@ -127,6 +144,8 @@ class SiteRunner:
         await self.save()
 
     async def _host(self) -> None:
+        if self._recorder is not None:
+            self._recorded = await self._recorder.recorded_position(self.site)
         snapshot = await self._store.latest_snapshot(self.site, self._producer)
         self._saved = 0 if snapshot is None else snapshot.position
         self._scans_sent = self._scans_done = 0 if snapshot is None else snapshot.scans
@@ -149,7 +168,10 @@ class SiteRunner:
                 await self.save()
 
     async def _send(self) -> None:
-        entries = await self._store.read_feed(self.site, self._sent, self._pace.chunk)
+        # The next events go on from the view right there, so that view has to be published.
+        short_of = self._recorded - self._sent
+        limit = min(self._pace.chunk, short_of) if short_of > 0 else self._pace.chunk
+        entries = await self._store.read_feed(self.site, self._sent, limit)
         if not entries:  # the site was deleted: its runner is about to be stopped
             self._end = self._sent
             return
@@ -157,7 +179,13 @@ class SiteRunner:
         self._sent = entries[-1].position
         self._scans_sent += sum(entry.kind == "scan" for entry in wanted)
         self._marks[self._sent] = self._scans_sent
-        answer = self._engine.feed(self.site, wanted, self._sent, caught_up=self._sent >= self._end)
+        answer = self._engine.feed(
+            self.site,
+            wanted,
+            self._sent,
+            caught_up=self._sent >= self._end,
+            publish=self._sent == self._recorded,
+        )
         self._under_way.append((asyncio.ensure_future(answer), self._sent, self._scans_sent))
 
     async def _await_one(self) -> None:

@@ -130,6 +130,8 @@ class Worker:
         hosted.position = order.through
         pause = _CAUGHT_UP_PAUSE_S if order.caught_up else self._publish_every_s
         hosted.due = hosted.earliest + max(pause, hosted.pause)
+        if order.publish:
+            self._publish(order.site, hosted)
         self._connection.send(Fed(order.site, order.run))
 
     def _snapshot(self, order: TakeSnapshot) -> None:

@@ -4,6 +4,7 @@ from fastapi import APIRouter
 
 from lineloom_service.routes import (
     constraints,
+    events,
     graph,
     ingest,
     maps,
@@ -24,6 +25,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     maps.router,
     graph.router,
     constraints.router,
+    events.router,
     match.router,
     status.router,
 )

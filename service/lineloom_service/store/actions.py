@@ -16,12 +16,14 @@ from lineloom_service.store.reads import read_skips
 from lineloom_service.store.records import (
     Appended,
     BacklogFullError,
+    EventBatch,
     NewScan,
     Skip,
     SnapshotRecord,
 )
 from lineloom_service.store.transaction import Transaction
 
+_FORGET_EVENTS_EVERY = 64
 _PURGE_PORTION = 2_000
 _SNAPSHOTS_KEPT = 2
 
@@ -121,7 +123,7 @@ def purge_portion(tx: Transaction) -> bool:
     if gone.rowcount == 0:
         robots = select(tables.robots.c.id).where(tables.robots.c.site_id == site_id)
         connection.execute(delete(tables.streams).where(tables.streams.c.robot_id.in_(robots)))
-        for table in (tables.robots, tables.skips, tables.snapshots):
+        for table in (tables.robots, tables.skips, tables.snapshots, tables.events):
             connection.execute(delete(table).where(table.c.site_id == site_id))
         connection.execute(delete(tables.sites).where(tables.sites.c.id == site_id))
     return True
@@ -181,3 +183,23 @@ def record_skip(tx: Transaction, site_id: int, position: int, reason: str) -> Sk
             insert(tables.skips).values(site_id=site_id, position=position, reason=reason)
         )
     return read_skips(tx.connection, site_id, position)[0]
+
+
+def append_events(tx: Transaction, site_id: int, batch: EventBatch, kept: int) -> None:
+    """Keep the events of a view and forget those before the last `kept` batches."""
+    if all(site.id != site_id for site in tx.ledger.sites.values()):
+        return
+    c = tables.events.c
+    tx.connection.execute(
+        insert(tables.events).values(
+            site_id=site_id,
+            number=batch.number,
+            position=batch.position,
+            version=batch.version,
+            producer=batch.producer,
+            body=batch.body,
+        )
+    )
+    if batch.number % _FORGET_EVENTS_EVERY == 0:
+        old = c.number <= batch.number - kept
+        tx.connection.execute(delete(tables.events).where(c.site_id == site_id, old))

@@ -7,6 +7,7 @@ from typing import Protocol
 
 from lineloom_service.store.records import (
     Appended,
+    EventBatch,
     LogEntry,
     NewScan,
     SiteRecord,
@@ -92,4 +93,16 @@ class Store(Protocol):
 
     async def drop_snapshot(self, site_id: int, position: int) -> None:
         """Remove a snapshot that turned out unreadable."""
+        ...
+
+    async def append_events(self, site_id: int, batch: EventBatch, kept: int) -> None:
+        """Keep the events of a published view; those before the last `kept` batches may go."""
+        ...
+
+    async def read_events(self, site_id: int, after: int, limit: int) -> list[EventBatch]:
+        """Return the batches of events after number `after`, at most `limit`, in order."""
+        ...
+
+    async def last_events(self, site_id: int) -> EventBatch | None:
+        """Return the newest batch of events."""
         ...

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sqlalchemy import Connection, select
 
 from lineloom_service.store import tables
-from lineloom_service.store.records import LogEntry, Skip, SnapshotRecord
+from lineloom_service.store.records import EventBatch, LogEntry, Skip, SnapshotRecord
 
 
 def read_feed(connection: Connection, site_id: int, after: int, limit: int) -> list[LogEntry]:
@@ -51,3 +51,28 @@ def read_snapshot(connection: Connection, site_id: int, producer: str) -> Snapsh
     )
     row = connection.execute(query).first()
     return None if row is None else SnapshotRecord(*row)
+
+
+def read_events(connection: Connection, site_id: int, after: int, limit: int) -> list[EventBatch]:
+    """Return the batches of events after a number, in order."""
+    c = tables.events.c
+    query = (
+        select(c.number, c.position, c.version, c.producer, c.body)
+        .where(c.site_id == site_id, c.number > after)
+        .order_by(c.number)
+        .limit(limit)
+    )
+    return [EventBatch(*row) for row in connection.execute(query)]
+
+
+def read_last_events(connection: Connection, site_id: int) -> EventBatch | None:
+    """Return the newest batch of events."""
+    c = tables.events.c
+    query = (
+        select(c.number, c.position, c.version, c.producer, c.body)
+        .where(c.site_id == site_id)
+        .order_by(c.number.desc())
+        .limit(1)
+    )
+    row = connection.execute(query).first()
+    return None if row is None else EventBatch(*row)

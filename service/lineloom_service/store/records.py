@@ -92,6 +92,21 @@ class Skip:
     reason: str
 
 
+@dataclass(frozen=True, slots=True)
+class EventBatch:
+    """The events of one published view.
+
+    number: 1, 2, … without holes. position, version: of the view. producer: the code that
+    published it. body: as `events.codec` encodes it.
+    """
+
+    number: int
+    position: int
+    version: int
+    producer: str
+    body: bytes
+
+
 class BacklogFullError(Exception):
     """The site's mapper is too far behind; nothing of the POST was taken."""
 

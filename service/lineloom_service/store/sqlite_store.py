@@ -21,6 +21,7 @@ from lineloom_service.store.migrate import migrate
 from lineloom_service.store.protocol import CommitListener
 from lineloom_service.store.records import (
     Appended,
+    EventBatch,
     LogEntry,
     NewScan,
     SiteRecord,
@@ -150,6 +151,20 @@ class SqliteStore:
     async def drop_snapshot(self, site_id: int, position: int) -> None:
         """Remove an unreadable snapshot."""
         await self._write(partial(actions.drop_snapshot, site_id=site_id, position=position))
+
+    async def append_events(self, site_id: int, batch: EventBatch, kept: int) -> None:
+        """Keep the events of a published view."""
+        await self._write(partial(actions.append_events, site_id=site_id, batch=batch, kept=kept))
+
+    async def read_events(self, site_id: int, after: int, limit: int) -> list[EventBatch]:
+        """Return batches of events."""
+        return await self._read(
+            partial(reads.read_events, site_id=site_id, after=after, limit=limit)
+        )
+
+    async def last_events(self, site_id: int) -> EventBatch | None:
+        """Return the newest batch of events."""
+        return await self._read(partial(reads.read_last_events, site_id=site_id))
 
     def _on_commit(self, record: SiteRecord) -> None:
         self._records[record.name] = record

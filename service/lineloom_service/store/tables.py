@@ -113,3 +113,16 @@ snapshots = Table(
     Column("producer", String(128), nullable=False),
     Column("data", LargeBinary, nullable=False),
 )
+
+# What was told to those who listen, a row for every published view that told anything.
+events = Table(
+    "events",
+    metadata,
+    Column("site_id", ForeignKey("sites.id"), primary_key=True, autoincrement=False),
+    # Without holes, but for the oldest ones that are no longer kept.
+    Column("number", BigInteger, primary_key=True, autoincrement=False),
+    Column("position", BigInteger, nullable=False),
+    Column("version", BigInteger, nullable=False),
+    Column("producer", String(128), nullable=False),
+    Column("body", LargeBinary, nullable=False),
+)

@@ -7,6 +7,17 @@ not know, so that an older client understands a newer service.
 
 from lineloom.wire.base import ID_PATTERN, MAX_BATCH, MAX_BEAMS, MAX_BODY_BYTES, Answer, Request
 from lineloom.wire.constraint import Constraint, ConstraintPage
+from lineloom.wire.event import (
+    AnyEvent,
+    ComponentMergedEvent,
+    ComponentSplitEvent,
+    ConstraintEvent,
+    Event,
+    MapEvent,
+    ResetEvent,
+    RobotEvent,
+    ScanEvent,
+)
 from lineloom.wire.graph import Graph, GraphEdge, GraphNode, GraphSummary
 from lineloom.wire.ingest import IngestAnswer, RejectedScan, ScanBatch
 from lineloom.wire.map import Line, MapAnswer, MapComponent
@@ -30,9 +41,14 @@ __all__ = [
     "MSGPACK",
     "Alternative",
     "Answer",
+    "AnyEvent",
     "Component",
+    "ComponentMergedEvent",
+    "ComponentSplitEvent",
     "Constraint",
+    "ConstraintEvent",
     "ConstraintPage",
+    "Event",
     "FieldError",
     "Graph",
     "GraphEdge",
@@ -44,6 +60,7 @@ __all__ = [
     "LinePair",
     "MapAnswer",
     "MapComponent",
+    "MapEvent",
     "MatchAnswer",
     "MatchRequest",
     "MatchScan",
@@ -54,12 +71,15 @@ __all__ = [
     "Readiness",
     "RejectedScan",
     "Request",
+    "ResetEvent",
     "Robot",
+    "RobotEvent",
     "RobotList",
     "RobotSettings",
     "Scan",
     "ScanBatch",
     "ScanCounts",
+    "ScanEvent",
     "Site",
     "SiteList",
     "Trajectory",

@@ -1,0 +1,61 @@
+"""What happens to a site, as it happens."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import AsyncGenerator
+from typing import Annotated
+
+from fastapi import APIRouter, Header, Query, Response
+
+from lineloom_service.dependencies import CurrentView, KnownSite, ServiceDep
+from lineloom_service.errors import TOO_MANY_STREAMS, ProblemError
+from lineloom_service.events.feed import EventFeed, Message
+from lineloom_service.events.stream import EventStream
+from lineloom_service.openapi import events_of
+from lineloom_service.service import Service
+
+router = APIRouter(tags=["events"])
+
+
+@router.get("/v1/sites/{site}/events", response_class=Response, responses=events_of("Event"))
+async def get_events(
+    site: KnownSite,
+    view: CurrentView,
+    service: ServiceDep,
+    last_event_id: Annotated[
+        str | None,
+        Header(description="The `id` of the last event that arrived: go on right after it."),
+    ] = None,
+    follow: Annotated[
+        bool, Query(description="false: end with the events there are so far.")
+    ] = True,
+) -> Response:
+    """Follow a site by Server-Sent Events: `scan`, `robot`, `constraint`, `component-merged`,
+    `component-split`, `map`, and `reset`.
+
+    Each has an `id`; with the latest as `Last-Event-ID` a listener goes on where it left off, also
+    after a restart of the service. `reset` says that this is not possible: load everything anew.
+    Without `Last-Event-ID` it begins with what happens from now on.
+    """
+    settings = service.settings
+    if service.event_streams >= settings.event_streams:
+        detail = f"{service.event_streams} listeners are connected, more are not taken"
+        raise ProblemError(TOO_MANY_STREAMS, detail, headers={"Retry-After": "10"})
+    feed = EventFeed(service.store, service.events, site.id, poll_s=None)
+    first = await feed.start(last_event_id, view.version)
+    following = feed.messages(settings.heartbeat_s, follow=follow)
+    return EventStream(_counted(service, first, following), settings.slow_reader_s)
+
+
+async def _counted(
+    service: Service, first: Message, following: AsyncGenerator[Message | None]
+) -> AsyncGenerator[Message | None]:
+    service.event_streams += 1
+    try:
+        yield first
+        async with contextlib.aclosing(following):
+            async for message in following:
+                yield message
+    finally:
+        service.event_streams -= 1

@@ -1,0 +1,49 @@
+"""Runs `serve_fake.py`: a real server process, with the fake mapper, to be killed at will."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+
+SERVER = Path(__file__).parent / "serve_fake.py"
+
+
+def free_port() -> int:
+    """Return a port that nothing listens on now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+@contextmanager
+def server(directory: Path, port: int, **environment: str) -> Iterator[subprocess.Popen[bytes]]:
+    """Run a server that answers; it is killed in the end."""
+    command = [sys.executable, str(SERVER), str(directory), str(port)]
+    values = {**os.environ, "PYTHONPATH": str(SERVER.parent), **environment}
+    with subprocess.Popen(command, env=values) as process:
+        try:
+            _wait_up(port, process)
+            yield process
+        finally:
+            process.kill()
+
+
+def _wait_up(port: int, process: subprocess.Popen[bytes]) -> None:
+    for _ in range(600):
+        assert process.poll() is None, "the server ended"
+        try:
+            if httpx.get(f"http://127.0.0.1:{port}/healthz").status_code == 200:
+                return
+        except httpx.TransportError:
+            pass
+        time.sleep(0.05)
+    raise AssertionError("never up")
