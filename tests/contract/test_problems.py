@@ -79,6 +79,7 @@ async def test_types_are_stable() -> None:
         "not-ready",
         "storage",
         "too-large",
+        "too-many-streams",
         "unknown-component",
         "unknown-constraint",
         "unknown-format",
