@@ -14,8 +14,9 @@ from lineloom_service.events.hub import EventHub
 from lineloom_service.events.recorder import EventRecorder
 from lineloom_service.matching import PairMatcher
 from lineloom_service.settings import Settings
+from lineloom_service.store.choice import database_at
 from lineloom_service.store.protocol import Store
-from lineloom_service.store.sqlite_store import SqliteStore
+from lineloom_service.store.sql_store import SqlStore
 
 _LOG = logging.getLogger(__name__)
 
@@ -27,8 +28,8 @@ class Service:
         self, settings: Settings, *, store: Store | None = None, engine: Engine | None = None
     ) -> None:
         self.settings = settings
-        self.store: Store = store or SqliteStore(
-            settings.database_path,
+        self.store: Store = store or SqlStore(
+            database_at(settings.database_url, settings.database_path),
             gap_window_s=settings.gap_window_s,
             max_held=settings.max_held,
         )

@@ -21,6 +21,11 @@ class Settings(BaseSettings):
     model_config = SettingsConfigDict(env_prefix="LINELOOM_", extra="ignore", frozen=True)
 
     data_dir: Path = Field(default=Path("lineloom-data"), description="Where everything is kept.")
+    database_url: str | None = Field(
+        default=None,
+        pattern=r"^postgresql\+asyncpg://",
+        description="PostgreSQL instead of a file in the data directory.",
+    )
     host: str = "127.0.0.1"
     port: int = Field(default=8765, ge=0, le=65535)
     open: bool = Field(

@@ -3,7 +3,20 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import AsyncIterator
 from pathlib import Path
+
+import pytest
+import pytest_asyncio
 
 # Worker processes inherit the path and import `fake_mapper` by its plain name.
 sys.path.insert(0, str(Path(__file__).parent))
+
+from tests.service.databases import KINDS, fresh_database
+
+
+@pytest_asyncio.fixture(params=KINDS)
+async def database_url(request: pytest.FixtureRequest) -> AsyncIterator[str | None]:
+    """An empty database of each kind in turn: its URL, None for a SQLite file."""
+    async with fresh_database(request.param) as url:
+        yield url

@@ -20,7 +20,8 @@ from lineloom_service.engine.site_runner import Published
 from lineloom_service.settings import Settings
 from lineloom_service.store.codec import decode_scan, encode_mount, encode_scan
 from lineloom_service.store.records import NewScan, SnapshotRecord
-from lineloom_service.store.sqlite_store import SqliteStore
+from lineloom_service.store.sql_store import SqlStore
+from lineloom_service.store.sqlite_database import SqliteDatabase
 
 RAISES, CRASHES, RAISES_ONCE = 666.0, 667.0, 668.0
 FAKE = "fake_mapper:FakeMapper"
@@ -53,8 +54,10 @@ class System:
             "snapshot_idle_s": 60.0,
         }
         self.settings = Settings.model_validate({**values, **changes})
-        self.store = SqliteStore(
-            self.settings.database_path, gap_window_s=self.settings.gap_window_s, max_held=100
+        self.store = SqlStore(
+            SqliteDatabase(self.settings.database_path),
+            gap_window_s=self.settings.gap_window_s,
+            max_held=100,
         )
         self.engine = LocalEngine(
             1, publish_every_s=self.settings.publish_every_s, mapper=FAKE, warm_up=None

@@ -1,9 +1,9 @@
-"""The laws of the scan log, on the SQLite store."""
+"""The laws of the scan log, on SQLite and on PostgreSQL."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 
 import pytest
@@ -11,8 +11,7 @@ import sqlalchemy as sa
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from lineloom_service.store import tables
-from lineloom_service.store.database import sqlite_engine
-from lineloom_service.store.migrate import downgrade, migrate
+from lineloom_service.store.choice import database_at
 from lineloom_service.store.records import (
     BacklogFullError,
     NewScan,
@@ -20,63 +19,70 @@ from lineloom_service.store.records import (
     SnapshotRecord,
     StoreError,
 )
-from lineloom_service.store.sqlite_store import SqliteStore
+from lineloom_service.store.sql_store import SqlStore
 
 NO_LIMIT = 10**9
+
+MakeStore = Callable[..., SqlStore]
 
 
 def _scans(seqs: Sequence[int], session: str = "0") -> list[NewScan]:
     return [NewScan(session, seq, f"{session}/{seq}".encode()) for seq in seqs]
 
 
-def _store(path: Path, window: float = 0.2) -> SqliteStore:
-    return SqliteStore(path / "lineloom.db", gap_window_s=window, max_held=1000)
-
-
-async def _post(
-    store: SqliteStore, seqs: Sequence[int], session: str = "0", robot: str = "r"
-) -> int:
+async def _post(store: SqlStore, seqs: Sequence[int], session: str = "0", robot: str = "r") -> int:
     answer = await store.append_scans(
         "site", robot, _scans(seqs, session), processed=0, limit=NO_LIMIT
     )
     return answer.accepted
 
 
-async def _record(store: SqliteStore) -> SiteRecord:
+async def _record(store: SqlStore) -> SiteRecord:
     record = await store.site("site")
     assert record is not None
     return record
 
 
-async def _feed(store: SqliteStore) -> list[tuple[str, str | None, int | None]]:
+async def _feed(store: SqlStore) -> list[tuple[str, str | None, int | None]]:
     entries = await store.read_feed((await _record(store)).id, 0, 10_000)
     assert [e.position for e in entries] == list(range(1, len(entries) + 1))
     return [(e.kind, e.session, e.seq) for e in entries]
 
 
 @pytest.fixture
-async def store(tmp_path: Path) -> AsyncIterator[SqliteStore]:
-    store = _store(tmp_path)
+def make_store(database_url: str | None, tmp_path: Path) -> MakeStore:
+    """A maker of stores that are not open yet, on this test's one database."""
+
+    def make(window: float = 0.2) -> SqlStore:
+        database = database_at(database_url, tmp_path / "lineloom.db")
+        return SqlStore(database, gap_window_s=window, max_held=1000)
+
+    return make
+
+
+@pytest.fixture
+async def store(make_store: MakeStore) -> AsyncIterator[SqlStore]:
+    store = make_store()
     await store.open()
     yield store
     await store.close()
 
 
-async def test_sending_again_changes_nothing(store: SqliteStore) -> None:
+async def test_sending_again_changes_nothing(store: SqlStore) -> None:
     assert await _post(store, range(10)) == 10
     again = await store.append_scans("site", "r", _scans(range(5, 15)), processed=0, limit=NO_LIMIT)
     assert (again.accepted, again.duplicates) == (5, 5)
     assert [seq for _, _, seq in await _feed(store)] == list(range(15))
 
 
-async def test_the_same_seq_twice_in_one_post_is_one_scan(store: SqliteStore) -> None:
+async def test_the_same_seq_twice_in_one_post_is_one_scan(store: SqlStore) -> None:
     answer = await store.append_scans(
         "site", "r", _scans([0, 1, 1, 0]), processed=0, limit=NO_LIMIT
     )
     assert (answer.accepted, answer.duplicates) == (2, 2)
 
 
-async def test_sessions_and_robots_count_for_themselves(store: SqliteStore) -> None:
+async def test_sessions_and_robots_count_for_themselves(store: SqlStore) -> None:
     assert await _post(store, [0, 1]) == 2
     assert await _post(store, [0, 1], session="1") == 2
     assert await _post(store, [0, 1], robot="other") == 2
@@ -85,7 +91,7 @@ async def test_sessions_and_robots_count_for_themselves(store: SqliteStore) -> N
     assert record.robots["r"].accepted == 4
 
 
-async def test_a_batch_is_sorted_and_a_gap_waits_until_it_is_filled(store: SqliteStore) -> None:
+async def test_a_batch_is_sorted_and_a_gap_waits_until_it_is_filled(store: SqlStore) -> None:
     await _post(store, [2, 0, 4, 1])
     record = await _record(store)
     assert (record.position, record.held, record.accepted) == (3, 1, 4)
@@ -93,7 +99,7 @@ async def test_a_batch_is_sorted_and_a_gap_waits_until_it_is_filled(store: Sqlit
     assert [seq for _, _, seq in await _feed(store)] == [0, 1, 2, 3, 4]
 
 
-async def test_a_gap_that_stays_is_passed_after_the_window(store: SqliteStore) -> None:
+async def test_a_gap_that_stays_is_passed_after_the_window(store: SqlStore) -> None:
     await _post(store, [0, 5, 7])
     assert (await _record(store)).position == 1
     await asyncio.sleep(0.4)
@@ -103,12 +109,12 @@ async def test_a_gap_that_stays_is_passed_after_the_window(store: SqliteStore) -
     assert [seq for _, _, seq in await _feed(store)] == [0, 5, 7, 6]
 
 
-async def test_held_scans_survive_a_restart(tmp_path: Path) -> None:
-    store = _store(tmp_path, window=60.0)
+async def test_held_scans_survive_a_restart(make_store: MakeStore) -> None:
+    store = make_store(window=60.0)
     await store.open()
     await _post(store, [0, 2, 3])
     await store.close()
-    store = _store(tmp_path, window=60.0)
+    store = make_store(window=60.0)
     await store.open()
     record = await _record(store)
     assert (record.position, record.held, record.accepted) == (1, 2, 3)
@@ -117,21 +123,21 @@ async def test_held_scans_survive_a_restart(tmp_path: Path) -> None:
     await store.close()
 
 
-async def test_the_feed_never_changes_once_given(tmp_path: Path) -> None:
-    store = _store(tmp_path, window=0.05)
+async def test_the_feed_never_changes_once_given(make_store: MakeStore) -> None:
+    store = make_store(window=0.05)
     await store.open()
     await _post(store, [3, 1])
     await asyncio.sleep(0.2)
     await _post(store, [0, 2, 4])
     before = await _feed(store)
     await store.close()
-    store = _store(tmp_path)
+    store = make_store()
     await store.open()
     assert await _feed(store) == before
     await store.close()
 
 
-async def test_concurrent_posts_share_commits_and_each_counts_once(store: SqliteStore) -> None:
+async def test_concurrent_posts_share_commits_and_each_counts_once(store: SqlStore) -> None:
     commits = 0
 
     def count(_: SiteRecord) -> None:
@@ -145,7 +151,7 @@ async def test_concurrent_posts_share_commits_and_each_counts_once(store: Sqlite
     assert [seq for _, _, seq in await _feed(store)] == list(range(200))
 
 
-async def test_a_mount_is_logged_once_between_the_scans_it_divides(store: SqliteStore) -> None:
+async def test_a_mount_is_logged_once_between_the_scans_it_divides(store: SqlStore) -> None:
     await _post(store, [0, 2])
     await store.set_mount("site", "r", b"m")
     await store.set_mount("site", "r", b"m")
@@ -159,7 +165,7 @@ async def test_a_mount_is_logged_once_between_the_scans_it_divides(store: Sqlite
     assert (await _record(store)).robots["r"].mount == b"m"
 
 
-async def test_a_forgotten_robot_may_start_anew(store: SqliteStore) -> None:
+async def test_a_forgotten_robot_may_start_anew(store: SqlStore) -> None:
     await _post(store, [0, 1])
     assert await store.forget_robot("site", "r")
     assert not await store.forget_robot("site", "r")
@@ -171,9 +177,7 @@ async def test_a_forgotten_robot_may_start_anew(store: SqliteStore) -> None:
     assert [kind for kind, _, _ in await _feed(store)] == ["scan", "scan", "forget", "scan"]
 
 
-async def test_a_deleted_site_leaves_nothing_and_its_id_never_comes_back(
-    store: SqliteStore, tmp_path: Path
-) -> None:
+async def test_a_deleted_site_leaves_nothing_and_its_id_never_comes_back(store: SqlStore) -> None:
     await _post(store, range(50))
     old = (await _record(store)).id
     await store.save_snapshot(old, SnapshotRecord(50, 50, "me", b"data"))
@@ -186,20 +190,19 @@ async def test_a_deleted_site_leaves_nothing_and_its_id_never_comes_back(
             break
     assert await _post(store, [0]) == 1
     assert (await _record(store)).id > old
-    engine = sqlite_engine(tmp_path / "lineloom.db")
+
+    def count_sites(connection: sa.Connection) -> int:
+        query = sa.select(sa.func.count()).select_from(tables.sites)
+        return connection.execute(query).scalar_one()
+
     for _ in range(200):
-        with engine.connect() as connection:
-            count = connection.execute(
-                sa.select(sa.func.count()).select_from(tables.sites)
-            ).scalar()
-        if count == 1:
+        if (count := await store._read(count_sites)) == 1:
             break
         await asyncio.sleep(0.02)
     assert count == 1
-    engine.dispose()
 
 
-async def test_a_full_backlog_takes_nothing(store: SqliteStore) -> None:
+async def test_a_full_backlog_takes_nothing(store: SqlStore) -> None:
     await _post(store, range(10))
     with pytest.raises(BacklogFullError) as refusal:
         await store.append_scans("site", "r", _scans(range(10, 20)), processed=2, limit=15)
@@ -209,12 +212,12 @@ async def test_a_full_backlog_takes_nothing(store: SqliteStore) -> None:
     assert taken.accepted == 10
 
 
-async def test_a_site_that_has_caught_up_takes_any_batch(store: SqliteStore) -> None:
+async def test_a_site_that_has_caught_up_takes_any_batch(store: SqlStore) -> None:
     answer = await store.append_scans("site", "r", _scans(range(10)), processed=0, limit=5)
     assert answer.accepted == 10
 
 
-async def test_one_failing_request_does_not_spoil_the_commit_it_shares(store: SqliteStore) -> None:
+async def test_one_failing_request_does_not_spoil_the_commit_it_shares(store: SqlStore) -> None:
     await _post(store, [0])
     results = await asyncio.gather(
         _post(store, [1]),
@@ -227,7 +230,7 @@ async def test_one_failing_request_does_not_spoil_the_commit_it_shares(store: Sq
     assert [seq for _, _, seq in await _feed(store)] == [0, 1, 2]
 
 
-async def test_skips_name_their_scan_and_the_first_reason_stands(store: SqliteStore) -> None:
+async def test_skips_name_their_scan_and_the_first_reason_stands(store: SqlStore) -> None:
     await _post(store, [0, 1])
     site = (await _record(store)).id
     await store.record_skip(site, 2, "first")
@@ -237,7 +240,7 @@ async def test_skips_name_their_scan_and_the_first_reason_stands(store: SqliteSt
 
 
 async def test_two_snapshots_are_kept_and_only_of_the_same_producer_used(
-    store: SqliteStore,
+    store: SqlStore,
 ) -> None:
     await _post(store, range(5))
     site = (await _record(store)).id
@@ -252,51 +255,11 @@ async def test_two_snapshots_are_kept_and_only_of_the_same_producer_used(
     assert await store.latest_snapshot(site, "v1") is None
 
 
-async def test_a_second_service_on_the_same_directory_is_refused(
-    store: SqliteStore, tmp_path: Path
-) -> None:
-    with pytest.raises(StoreError, match="another Lineloom service"):
-        await _store(tmp_path).open()
+async def test_migrations_and_tables_say_the_same(store: SqlStore) -> None:
+    def differences(connection: sa.Connection) -> list[object]:
+        found: list[object] = compare_metadata(
+            MigrationContext.configure(connection), tables.metadata
+        )
+        return found
 
-
-async def test_an_older_database_is_upgraded_with_what_it_holds(tmp_path: Path) -> None:
-    store = _store(tmp_path)
-    await store.open()
-    await _post(store, range(3))
-    await store.close()
-    engine = sqlite_engine(tmp_path / "lineloom.db")
-    with engine.begin() as connection:
-        downgrade(connection, "0001")
-        assert "snapshots" not in sa.inspect(connection).get_table_names()
-    engine.dispose()
-    store = _store(tmp_path)
-    await store.open()
-    assert [seq for _, _, seq in await _feed(store)] == [0, 1, 2]
-    assert await store.latest_snapshot((await _record(store)).id, "v1") is None
-    await store.close()
-
-
-async def test_a_newer_database_is_refused_in_plain_words(tmp_path: Path) -> None:
-    engine = sqlite_engine(tmp_path / "lineloom.db")
-    with engine.begin() as connection:
-        migrate(connection)
-        connection.execute(sa.text("UPDATE alembic_version SET version_num = '9999'"))
-    engine.dispose()
-    with pytest.raises(StoreError, match="newer version"):
-        await _store(tmp_path).open()
-
-
-def test_migrations_and_tables_say_the_same(tmp_path: Path) -> None:
-    engine = sqlite_engine(tmp_path / "lineloom.db")
-    with engine.begin() as connection:
-        migrate(connection)
-        differences = compare_metadata(MigrationContext.configure(connection), tables.metadata)
-    engine.dispose()
-    assert differences == []
-
-
-async def test_an_unusable_directory_is_named(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    store = SqliteStore(tmp_path / "file" / "lineloom.db", gap_window_s=1.0, max_held=10)
-    with pytest.raises(StoreError, match="cannot use"):
-        await store.open()
+    assert await store._read(differences) == []

@@ -48,6 +48,7 @@ class Conductor:
         self._stop_grace_s = settings.stop_grace_s
         self._runners: dict[int, SiteRunner] = {}
         self._tasks: dict[int, asyncio.Task[None]] = {}
+        self._forgetting: set[asyncio.Task[None]] = set()
         self._stopping = False
 
     async def start(self) -> None:
@@ -121,7 +122,11 @@ class Conductor:
         if self._stopping:
             return
         runner = self._runners.get(record.id)
-        if runner is None:
+        if record.deleted:
+            forgetting = asyncio.create_task(self.forget_site(record.id))
+            self._forgetting.add(forgetting)
+            forgetting.add_done_callback(self._forgetting.discard)
+        elif runner is None:
             # New: nothing to restore, so it does not keep the service from being ready.
             self._runner(record).restored.set()
         else:

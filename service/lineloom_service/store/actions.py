@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sqlalchemy import delete, func, insert, select, update
+from sqlalchemy import Connection, delete, func, insert, select, update
 
 from lineloom_service.store import tables
+from lineloom_service.store.database import notify
 from lineloom_service.store.ledger import SiteLedger
 from lineloom_service.store.reads import read_skips
 from lineloom_service.store.records import (
@@ -20,6 +21,8 @@ from lineloom_service.store.records import (
     NewScan,
     Skip,
     SnapshotRecord,
+    StoreError,
+    ViewRecord,
 )
 from lineloom_service.store.transaction import Transaction
 
@@ -95,17 +98,11 @@ def forget_robot(tx: Transaction, site_name: str, robot_name: str) -> bool:
 
 
 def delete_site(tx: Transaction, site_name: str) -> int | None:
-    """Forget a site; returns its id. Its rows go later, in portions that block nobody."""
-    site = tx.ledger.sites.pop(site_name, None)
+    """Forget a site; returns its id."""
+    site = tx.ledger.sites.get(site_name)
     if site is None:
         return None
-    tx.flush()
-    tx.touched.pop(site.id, None)
-    for robot in site.robots.values():
-        tx.ledger.waiting.pop(robot.id, None)
-    tx.connection.execute(
-        update(tables.sites).where(tables.sites.c.id == site.id).values(deleted=True)
-    )
+    tx.remove_site(site)
     return site.id
 
 
@@ -123,18 +120,17 @@ def purge_portion(tx: Transaction) -> bool:
     if gone.rowcount == 0:
         robots = select(tables.robots.c.id).where(tables.robots.c.site_id == site_id)
         connection.execute(delete(tables.streams).where(tables.streams.c.robot_id.in_(robots)))
-        for table in (tables.robots, tables.skips, tables.snapshots, tables.events):
+        t = tables
+        for table in (t.robots, t.skips, t.snapshots, t.events, t.views):
             connection.execute(delete(table).where(table.c.site_id == site_id))
         connection.execute(delete(tables.sites).where(tables.sites.c.id == site_id))
     return True
 
 
-def release_due(tx: Transaction, now: float) -> float | None:
-    """Release the scans that have waited long enough; returns when the next one will have."""
+def release_due(tx: Transaction, now: float) -> None:
+    """Release the scans that have waited long enough."""
     for site, robot in list(tx.ledger.waiting.values()):
         tx.release_scans(site, robot, now)
-    deadlines = [robot.order.next_deadline() for _, robot in tx.ledger.waiting.values()]
-    return min((deadline for deadline in deadlines if deadline is not None), default=None)
 
 
 def save_snapshot(tx: Transaction, site_id: int, snapshot: SnapshotRecord) -> None:
@@ -203,3 +199,27 @@ def append_events(tx: Transaction, site_id: int, batch: EventBatch, kept: int) -
     if batch.number % _FORGET_EVENTS_EVERY == 0:
         old = c.number <= batch.number - kept
         tx.connection.execute(delete(tables.events).where(c.site_id == site_id, old))
+    notify(tx.connection, f"events {site_id}")
+
+
+def save_view(connection: Connection, site_id: int, view: ViewRecord, term: int) -> None:
+    """Keep a site's view, in a transaction of its own, and tell the other processes."""
+    check_term(connection.execute(select(tables.clock.c.term)).scalar_one(), term)
+    values = {"position": view.position, "data": view.data}
+    c = tables.views.c
+    there = connection.execute(update(tables.views).where(c.site_id == site_id).values(values))
+    if not there.rowcount:
+        connection.execute(insert(tables.views).values(site_id=site_id, **values))
+    notify(connection, f"view {site_id}")
+
+
+def begin_term(tx: Transaction) -> int:
+    """Count another engine; what former ones write from now on is refused."""
+    tx.connection.execute(update(tables.clock).values(term=tx.term + 1))
+    return tx.term + 1
+
+
+def check_term(current: int, mine: int) -> None:
+    """Raise StoreError where another engine has taken over since."""
+    if current != mine:
+        raise StoreError("another mapping engine has taken over this database")

@@ -1,74 +1,68 @@
-"""The SQLite file: how it is opened, and that only one service has it."""
+"""Where the tables are, as the store sees it: SQLite or PostgreSQL behind the same few calls."""
 
 from __future__ import annotations
 
-import fcntl
-import os
-from pathlib import Path
-from typing import IO, Any
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol, TypeVar
 
-from sqlalchemy import Engine, create_engine, event
+from sqlalchemy import Connection
 
-from lineloom_service.store.records import StoreError
+T = TypeVar("T")
 
-_PRAGMAS = (
-    "PRAGMA journal_mode = WAL",
-    # A commit returns when it is on the disk, not when it is on its way.
-    "PRAGMA synchronous = FULL",
-    "PRAGMA foreign_keys = ON",
-    "PRAGMA busy_timeout = 5000",
-)
+Work = Callable[[Connection], T]
+"""Plain synchronous SQLAlchemy, so that the same lines serve every kind of database."""
+
+NoticeListener = Callable[[str], None]
+"""Called on the event loop with what another process on this database says it did."""
 
 
-def sqlite_engine(path: Path) -> Engine:
-    """Return an engine whose every connection is durable and tolerant of a concurrent reader."""
-    engine = create_engine(
-        f"sqlite:///{path}", connect_args={"check_same_thread": False}, pool_size=4
-    )
-    event.listen(engine, "connect", _prepare)
-    return engine
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """The right to map what is in the database. lost: set when it is somebody else's to take."""
+
+    lost: asyncio.Event = field(default_factory=asyncio.Event)
 
 
-def _prepare(connection: Any, _record: Any) -> None:
-    cursor = connection.cursor()
-    for pragma in _PRAGMAS:
-        cursor.execute(pragma)
-    cursor.close()
+class ClaimedError(Exception):
+    """Another mapping engine has the database."""
 
 
-class DirectoryLock:
-    """Keeps a second service off the same directory: there is one writer.
+class Database(Protocol):
+    """Runs work on connections. Errors of SQLAlchemy pass through.
 
-    The kernel lets go of it when the process ends, however it ends.
+    shared: other processes may use the same database at the same time.
     """
 
-    def __init__(self, directory: Path) -> None:
-        self._path = directory / "lock"
-        self._file: IO[str] | None = None
+    shared: bool
 
-    def acquire(self) -> None:
-        """Take the lock or raise StoreError."""
-        try:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            file = self._path.open("a+")
-        except OSError as error:
-            raise StoreError(f"cannot use {self._path.parent}: {error.strerror}") from error
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            file.seek(0)
-            owner = file.read().strip() or "unknown"
-            file.close()
-            raise StoreError(
-                f"another Lineloom service uses {self._path.parent} (process {owner})"
-            ) from error
-        file.truncate(0)
-        file.write(str(os.getpid()))
-        file.flush()
-        self._file = file
+    async def open(self) -> None:
+        """Connect, and create or upgrade the tables. Raises StoreError."""
+        ...
 
-    def release(self) -> None:
-        """Let go."""
-        if self._file is not None:
-            self._file.close()
-            self._file = None
+    async def close(self) -> None:
+        """Disconnect."""
+        ...
+
+    async def read(self, work: Work[T]) -> T:
+        """Run work that changes nothing, on one consistent state of the tables."""
+        ...
+
+    async def write(self, work: Work[T]) -> T:
+        """Run work within a transaction; it is on disk when this returns."""
+        ...
+
+    def listen(self, listener: NoticeListener) -> None:
+        """Have `listener` told of `notify`; of an empty text where notices may have been lost."""
+        ...
+
+    async def claim(self, *, wait: bool) -> Claim:
+        """Become the only one who maps. Raises ClaimedError where another is and we do not wait."""
+        ...
+
+
+def notify(connection: Connection, text: str) -> None:
+    """Tell the other processes once the transaction is committed; nobody where none can be."""
+    if connection.dialect.name == "postgresql":
+        connection.exec_driver_sql("SELECT pg_notify('lineloom', $1)", (text,))

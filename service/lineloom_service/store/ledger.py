@@ -1,14 +1,15 @@
 """What the writer knows of each site without asking the database.
 
-There is one writer, so its memory is the truth between two commits; after a failed one it is
-thrown away and read again.
+Whoever writes locks the clock first, so this memory is the truth once it has caught up with the
+clock's revision; after a failed commit it is thrown away and read again.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from sqlalchemy import Connection, select
+from sqlalchemy import Connection, Select, select
 
 from lineloom_service.store import tables
 from lineloom_service.store.records import RobotRecord, SiteRecord
@@ -46,7 +47,7 @@ class SiteLedger:
     changed: set[str] = field(default_factory=set)
     _records: dict[str, RobotRecord] = field(default_factory=dict)
 
-    def record(self) -> SiteRecord:
+    def record(self, *, deleted: bool = False) -> SiteRecord:
         """Return what others may know. Costs as much as changed since the last time."""
         if self.changed:
             records = dict(self._records)
@@ -63,6 +64,7 @@ class SiteLedger:
             held=self.held,
             accepted=self.accepted,
             robots=self._records,
+            deleted=deleted,
         )
 
 
@@ -70,56 +72,108 @@ class SiteLedger:
 class Ledger:
     """All sites by name, and the id that the next log entry gets.
 
-    waiting: the robots that hold scans back, by id.
+    revision: the clock's that this is the truth of. waiting: the robots that hold scans back, by
+    id.
     """
 
-    sites: dict[str, SiteLedger]
-    next_entry: int
+    window_s: float
+    max_held: int
+    sites: dict[str, SiteLedger] = field(default_factory=dict)
+    next_entry: int = 1
+    revision: int = -1
     waiting: dict[int, tuple[SiteLedger, RobotLedger]] = field(default_factory=dict)
 
+    def add(self, site: SiteLedger) -> None:
+        """Take a site in."""
+        self.sites[site.name] = site
+        for robot in site.robots.values():
+            if robot.order.held:
+                self.waiting[robot.id] = (site, robot)
 
-def read_ledger(connection: Connection, now: float, window_s: float, max_held: int) -> Ledger:
-    """Read the writer's memory from the database. Held scans start waiting anew at `now`."""
-    sites = {
-        row.id: SiteLedger(row.id, row.name, row.position)
-        for row in connection.execute(select(tables.sites).where(tables.sites.c.deleted.is_(False)))
+    def remove(self, site: SiteLedger) -> None:
+        """Forget a site."""
+        del self.sites[site.name]
+        for robot in site.robots.values():
+            self.waiting.pop(robot.id, None)
+
+    def next_deadline(self) -> float | None:
+        """When the scan that waits longest must go out; None when none waits."""
+        deadlines = [robot.order.next_deadline() for _, robot in self.waiting.values()]
+        return min((deadline for deadline in deadlines if deadline is not None), default=None)
+
+    def catch_up(self, connection: Connection, revision: int, now: float) -> list[SiteRecord]:
+        """Read what others changed, up to the clock's `revision`; return those sites.
+
+        A scan that has been held since before keeps its time of arrival; others arrive `now`.
+        """
+        if revision == self.revision:
+            return []
+        here = {site.id: site for site in self.sites.values()}
+        rows = connection.execute(
+            select(tables.sites).where(tables.sites.c.deleted.is_(False))
+        ).all()
+        alive = {row.id for row in rows}
+        gone = [site for site in here.values() if site.id not in alive]
+        fresh = [
+            SiteLedger(row.id, row.name, row.position)
+            for row in rows
+            if row.revision > self.revision
+        ]
+        _read_robots(connection, fresh, self, now)
+        for site in [*gone, *(here[site.id] for site in fresh if site.id in here)]:
+            self.remove(site)
+        for site in fresh:
+            self.add(site)
+        last = select(tables.entries.c.id).order_by(tables.entries.c.id.desc()).limit(1)
+        self.next_entry = max(self.next_entry, (connection.execute(last).scalar() or 0) + 1)
+        self.revision = revision
+        return [site.record(deleted=True) for site in gone] + [site.record() for site in fresh]
+
+
+def _read_robots(
+    connection: Connection, sites: Iterable[SiteLedger], ledger: Ledger, now: float
+) -> None:
+    by_id = {site.id: site for site in sites}
+    if not by_id:
+        return
+    arrived = {
+        entry: time
+        for _, robot in ledger.waiting.values()
+        for stream in robot.order.streams.values()
+        for entry, time in stream.held.values()
     }
-    streams = _read_streams(connection, now)
-    waiting: dict[int, tuple[SiteLedger, RobotLedger]] = {}
-    for row in connection.execute(select(tables.robots).order_by(tables.robots.c.id)):
-        site = sites.get(row.site_id)
-        if site is None:
-            continue
-        robot = RobotLedger(
-            row.id, row.name, Sequencer(window_s, max_held, streams.get(row.id, ())), row.mount
-        )
-        site.accepted += robot.order.accepted
-        if row.forgotten:
-            continue
-        site.held += robot.order.held
-        site.robots[row.name] = robot
-        site.changed.add(row.name)
-        if robot.order.held:
-            waiting[robot.id] = (site, robot)
-    last = connection.execute(
-        select(tables.entries.c.id).order_by(tables.entries.c.id.desc()).limit(1)
-    ).scalar()
-    return Ledger({site.name: site for site in sites.values()}, (last or 0) + 1, waiting)
+    changed = select(tables.sites.c.id).where(
+        tables.sites.c.deleted.is_(False), tables.sites.c.revision > ledger.revision
+    )
+    streams = _read_streams(connection, changed, arrived, now)
+    robots = select(tables.robots).where(tables.robots.c.site_id.in_(changed))
+    for row in connection.execute(robots.order_by(tables.robots.c.id)):
+        site = by_id[row.site_id]
+        order = Sequencer(ledger.window_s, ledger.max_held, streams.get(row.id, ()))
+        site.accepted += order.accepted
+        if not row.forgotten:
+            site.held += order.held
+            site.robots[row.name] = RobotLedger(row.id, row.name, order, row.mount)
+            site.changed.add(row.name)
 
 
-def _read_streams(connection: Connection, now: float) -> dict[int, list[Stream]]:
+def _read_streams(
+    connection: Connection, sites: Select[tuple[int]], arrived: dict[int, float], now: float
+) -> dict[int, list[Stream]]:
     by_robot: dict[int, list[Stream]] = {}
     by_id: dict[int, Stream] = {}
-    for row in connection.execute(select(tables.streams).order_by(tables.streams.c.id)):
+    robots = select(tables.robots.c.id).where(tables.robots.c.site_id.in_(sites))
+    query = select(tables.streams).where(tables.streams.c.robot_id.in_(robots))
+    for row in connection.execute(query.order_by(tables.streams.c.id)):
         stream = Stream(row.id, row.session, row.released, row.highest, row.accepted)
         by_robot.setdefault(row.robot_id, []).append(stream)
         by_id[row.id] = stream
     entries = tables.entries.c
     held = (
         select(entries.id, entries.stream_id, entries.seq)
-        .where(entries.position.is_(None))
+        .where(entries.site_id.in_(sites), entries.position.is_(None))
         .order_by(entries.id)
     )
     for row in connection.execute(held):
-        by_id[row.stream_id].held[row.seq] = (row.id, now)
+        by_id[row.stream_id].held[row.seq] = (row.id, arrived.get(row.id, now))
     return by_robot

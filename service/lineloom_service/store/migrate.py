@@ -6,6 +6,7 @@ from pathlib import Path
 
 from alembic import command
 from alembic.config import Config
+from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from alembic.util import CommandError
 from sqlalchemy import Connection
@@ -24,6 +25,14 @@ def migrate(connection: Connection, revision: str = "head") -> None:
             "the database was written by a newer version of Lineloom "
             f"(this one knows revision {newest}): {error}"
         ) from error
+
+
+def outdated(connection: Connection) -> str | None:
+    """Return the revision of a database that `migrate` would upgrade; None where it is new."""
+    script = ScriptDirectory.from_config(_config(connection))
+    current = MigrationContext.configure(connection).get_current_revision()
+    known = {step.revision for step in script.walk_revisions()}
+    return current if current in known - {script.get_current_head()} else None
 
 
 def downgrade(connection: Connection, revision: str) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Literal, Protocol
 
+from lineloom_service.store.database import Claim
 from lineloom_service.store.records import (
     Appended,
     EventBatch,
@@ -13,10 +14,18 @@ from lineloom_service.store.records import (
     SiteRecord,
     Skip,
     SnapshotRecord,
+    ViewRecord,
 )
 
 CommitListener = Callable[[SiteRecord], None]
-"""Called on the event loop after a commit changed a site, before the request is answered."""
+"""Called on the event loop with every site at `open`, and after each commit, of whatever process,
+with those that it changed, before the request is answered."""
+
+NewsKind = Literal["view", "events"]
+NEWS: dict[str, NewsKind] = {"view": "view", "events": "events"}
+
+NewsListener = Callable[[NewsKind, int], None]
+"""Called on the event loop with what another process saved, and the id of its site."""
 
 
 class Store(Protocol):
@@ -24,7 +33,15 @@ class Store(Protocol):
 
     Whatever an `await` returned from is on disk. Names of sites and robots are unique among
     those that exist; a name that was deleted may be used again for something new.
+
+    shared: other processes may use the same storage at the same time. One of all maps: it has a
+    claim, and what else only it may write raises StoreError once the claim is lost.
     """
+
+    @property
+    def shared(self) -> bool:
+        """Whether there may be other processes."""
+        ...
 
     async def open(self) -> None:
         """Make the storage usable, upgrading an older one."""
@@ -105,4 +122,23 @@ class Store(Protocol):
 
     async def last_events(self, site_id: int) -> EventBatch | None:
         """Return the newest batch of events."""
+        ...
+
+    async def save_view(self, site_id: int, view: ViewRecord) -> None:
+        """Keep the view of a site for the other processes' queries."""
+        ...
+
+    async def view(self, site_id: int, after: int) -> ViewRecord | None:
+        """Return the view that was saved last, unless it is not after position `after`."""
+        ...
+
+    def subscribe_news(self, listener: NewsListener) -> None:
+        """Have `listener` told of views and events that were saved."""
+        ...
+
+    async def claim_mapping(self, *, wait: bool) -> Claim:
+        """Become the one process that maps.
+
+        Raises ClaimedError where another is and `wait` is false.
+        """
         ...

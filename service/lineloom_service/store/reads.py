@@ -5,7 +5,13 @@ from __future__ import annotations
 from sqlalchemy import Connection, select
 
 from lineloom_service.store import tables
-from lineloom_service.store.records import EventBatch, LogEntry, Skip, SnapshotRecord
+from lineloom_service.store.records import EventBatch, LogEntry, Skip, SnapshotRecord, ViewRecord
+
+
+def read_revision(connection: Connection) -> int:
+    """Return the clock's count of commits that changed a site."""
+    revision: int = connection.execute(select(tables.clock.c.revision)).scalar_one()
+    return revision
 
 
 def read_feed(connection: Connection, site_id: int, after: int, limit: int) -> list[LogEntry]:
@@ -76,3 +82,11 @@ def read_last_events(connection: Connection, site_id: int) -> EventBatch | None:
     )
     row = connection.execute(query).first()
     return None if row is None else EventBatch(*row)
+
+
+def read_view(connection: Connection, site_id: int, after: int) -> ViewRecord | None:
+    """Return the published view of a site, unless it is not after position `after`."""
+    c = tables.views.c
+    query = select(c.position, c.data).where(c.site_id == site_id, c.position > after)
+    row = connection.execute(query).first()
+    return None if row is None else ViewRecord(*row)

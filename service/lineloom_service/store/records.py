@@ -45,6 +45,7 @@ class SiteRecord:
 
     id: never used again, also when a deleted site's name is. position: entries released to the
     mapper so far, 1..position without holes. held: scans accepted, but not yet released.
+    deleted: it is gone, and nothing else here means anything.
     """
 
     id: int
@@ -53,6 +54,7 @@ class SiteRecord:
     held: int
     accepted: int
     robots: dict[str, RobotRecord] = field(default_factory=dict)
+    deleted: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +79,14 @@ class SnapshotRecord:
     position: int
     scans: int
     producer: str
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class ViewRecord:
+    """A view published after the entry at `position`, for the other processes' queries."""
+
+    position: int
     data: bytes
 
 

@@ -23,6 +23,16 @@ metadata = MetaData()
 # SQLite numbers rows by itself only in a column of type INTEGER.
 _Id = BigInteger().with_variant(Integer, "sqlite")
 
+clock = Table(
+    "clock",
+    metadata,
+    # There is one row. Whoever changes sites, robots, sessions or entries locks it first.
+    Column("id", Integer, primary_key=True, autoincrement=False),
+    Column("revision", BigInteger, nullable=False, server_default=text("0")),
+    # Counts the engines that ever had the right to map.
+    Column("term", BigInteger, nullable=False, server_default=text("0")),
+)
+
 sites = Table(
     "sites",
     metadata,
@@ -31,6 +41,8 @@ sites = Table(
     # Entries released to the mapper so far.
     Column("position", BigInteger, nullable=False, server_default=text("0")),
     Column("deleted", Boolean, nullable=False, server_default=false()),
+    # The clock's when it last changed, its robots and sessions included.
+    Column("revision", BigInteger, nullable=False, server_default=text("0")),
     Index(
         "ux_sites_name",
         "name",
@@ -125,4 +137,12 @@ events = Table(
     Column("version", BigInteger, nullable=False),
     Column("producer", String(128), nullable=False),
     Column("body", LargeBinary, nullable=False),
+)
+
+views = Table(
+    "views",
+    metadata,
+    Column("site_id", ForeignKey("sites.id"), primary_key=True, autoincrement=False),
+    Column("position", BigInteger, nullable=False),
+    Column("data", LargeBinary, nullable=False),
 )

@@ -27,25 +27,26 @@ _UPDATE_STREAM = (
 _UPDATE_SITE = (
     update(tables.sites)
     .where(tables.sites.c.id == bindparam("site"))
-    .values(position=bindparam("place"))
+    .values(position=bindparam("place"), revision=bindparam("revision_now"))
 )
+_COUNT_ON = update(tables.clock).values(revision=bindparam("revision_now"))
 
 
 class Transaction:
     """Changes ledger and database together. Used by the writer's thread only.
 
-    connection: within a database transaction that the caller commits, after `flush`. touched: the
-    sites that changed, by id.
+    connection: within a database transaction that has locked the clock and that the caller
+    commits, after `flush`. term: the clock's. touched: the sites that changed, by id; gone: those
+    deleted.
     """
 
-    def __init__(
-        self, connection: Connection, ledger: Ledger, window_s: float, max_held: int
-    ) -> None:
+    def __init__(self, connection: Connection, ledger: Ledger, term: int) -> None:
         self.connection = connection
         self.ledger = ledger
+        self.term = term
         self.touched: dict[int, SiteLedger] = {}
-        self._window_s = window_s
-        self._max_held = max_held
+        self.gone: list[SiteLedger] = []
+        self._counted_on = False
         self._new: dict[int, dict[str, Any]] = {}
         self._placed: list[dict[str, int]] = []
         self._streams: dict[int, Stream] = {}
@@ -64,7 +65,8 @@ class Transaction:
         robot = site.robots.get(name)
         if robot is None:
             number = self._insert(tables.robots, site_id=site.id, name=name)
-            robot = RobotLedger(number, name, Sequencer(self._window_s, self._max_held))
+            order = Sequencer(self.ledger.window_s, self.ledger.max_held)
+            robot = RobotLedger(number, name, order)
             site.robots[name] = robot
             site.changed.add(name)
             self.touched[site.id] = site
@@ -127,8 +129,22 @@ class Transaction:
                 found.update(self.connection.execute(query).scalars())
         return found
 
+    def remove_site(self, site: SiteLedger) -> None:
+        """Forget a site. Its rows go later, in portions that block nobody."""
+        self.flush()
+        self.touched.pop(site.id, None)
+        self.ledger.remove(site)
+        self.gone.append(site)
+        self.connection.execute(
+            update(tables.sites).where(tables.sites.c.id == site.id).values(deleted=True)
+        )
+
     def flush(self) -> None:
         """Send what was gathered to the database."""
+        if (self.touched or self.gone) and not self._counted_on:
+            self._counted_on = True
+            self.ledger.revision += 1
+            self.connection.execute(_COUNT_ON, {"revision_now": self.ledger.revision})
         if self._new:
             self.connection.execute(insert(tables.entries), list(self._new.values()))
         if self._placed:
@@ -136,7 +152,10 @@ class Transaction:
         if self._streams:
             self.connection.execute(_UPDATE_STREAM, [_row(s) for s in self._streams.values()])
         if self.touched:
-            places = [{"site": s.id, "place": s.position} for s in self.touched.values()]
+            places = [
+                {"site": s.id, "place": s.position, "revision_now": self.ledger.revision}
+                for s in self.touched.values()
+            ]
             self.connection.execute(_UPDATE_SITE, places)
         self._new = {}
         self._placed = []

@@ -21,6 +21,13 @@ def serve(
         Path | None,
         typer.Option(metavar="DIR", help="Where everything is kept; ./lineloom-data."),
     ] = None,
+    database_url: Annotated[
+        str | None,
+        typer.Option(
+            metavar="URL",
+            help="PostgreSQL instead of a file: postgresql+asyncpg://user:password@host/database.",
+        ),
+    ] = None,
     workers: Annotated[
         int | None,
         typer.Option(min=1, max=64, metavar="N", help="Mapping processes; all cores but one."),
@@ -56,6 +63,7 @@ def serve(
         "host": host,
         "port": port,
         "data_dir": data_dir,
+        "database_url": database_url,
         "workers": workers,
         "open": open_,
         "log_level": log_level,

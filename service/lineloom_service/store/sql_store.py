@@ -1,4 +1,4 @@
-"""The embedded store: one SQLite file, one writer, readers beside it (WAL)."""
+"""The store in a SQL database, the same for SQLite and PostgreSQL."""
 
 from __future__ import annotations
 
@@ -6,19 +6,15 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from pathlib import Path
 from typing import TypeVar
 
-from sqlalchemy import Connection, Engine
 from sqlalchemy.exc import SQLAlchemyError
 
 from lineloom_service.store import actions, reads
-from lineloom_service.store.database import DirectoryLock, sqlite_engine
+from lineloom_service.store.database import Claim, Database, Work
 from lineloom_service.store.group_commit import GroupCommit
-from lineloom_service.store.migrate import migrate
-from lineloom_service.store.protocol import CommitListener
+from lineloom_service.store.protocol import NEWS, CommitListener, NewsListener
 from lineloom_service.store.records import (
     Appended,
     EventBatch,
@@ -28,6 +24,7 @@ from lineloom_service.store.records import (
     Skip,
     SnapshotRecord,
     StoreError,
+    ViewRecord,
 )
 from lineloom_service.store.transaction import Transaction
 
@@ -36,55 +33,49 @@ T = TypeVar("T")
 _LOG = logging.getLogger(__name__)
 
 
-class SqliteStore:
-    """Implements `store.protocol.Store` on a file."""
+class SqlStore:
+    """Implements `store.protocol.Store` on a database."""
 
-    def __init__(self, path: Path, *, gap_window_s: float, max_held: int) -> None:
-        self._path = path
-        self._gap_window_s = gap_window_s
-        self._max_held = max_held
-        self._lock = DirectoryLock(path.parent)
+    def __init__(self, database: Database, *, gap_window_s: float, max_held: int) -> None:
+        self.shared = database.shared
+        self._database = database
         self._records: dict[str, SiteRecord] = {}
         self._listeners: list[CommitListener] = []
+        self._news_listeners: list[NewsListener] = []
+        self._writer = GroupCommit(database, gap_window_s, max_held, self._on_commit)
         self._purge: asyncio.Task[None] | None = None
-        self._engine: Engine | None = None
-        self._writer: GroupCommit | None = None
-        self._readers: ThreadPoolExecutor | None = None
+        self._refresh: asyncio.Task[None] | None = None
+        self._term = 0
 
     async def open(self) -> None:
-        """Lock the directory, upgrade the database, start the writer."""
-        self._lock.acquire()
+        """Open the database, read what is known, start the writer."""
+        await self._database.open()
         try:
-            await self._start()
+            self._database.listen(self._on_notice)
+            await self._writer.start()
+        except SQLAlchemyError as error:
+            await self._database.close()
+            raise StoreError(f"the database cannot be read: {error}") from error
         except BaseException:
-            self._lock.release()
+            await self._database.close()
             raise
-
-    async def _start(self) -> None:
-        self._engine = sqlite_engine(self._path)
-        await asyncio.to_thread(_upgrade, self._engine, self._path)
-        self._readers = ThreadPoolExecutor(2, thread_name_prefix="lineloom-reader")
-        self._writer = GroupCommit(
-            self._engine, self._gap_window_s, self._max_held, self._on_commit
-        )
-        self._records = {record.name: record for record in await self._writer.start()}
         self._purge = asyncio.create_task(self._purge_deleted())
 
     async def close(self) -> None:
-        """Commit what is under way and let go of the file."""
-        if self._purge is not None:
-            self._purge.cancel()
-        if self._writer is not None:
-            await self._writer.stop()
-        if self._readers is not None:
-            self._readers.shutdown()
-        if self._engine is not None:
-            self._engine.dispose()
-        self._lock.release()
+        """Commit what is under way and let go of the database."""
+        for task in (self._purge, self._refresh):
+            if task is not None:
+                task.cancel()
+        await self._writer.stop()
+        await self._database.close()
 
     def subscribe(self, listener: CommitListener) -> None:
         """Have `listener` told of every site that a commit changed."""
         self._listeners.append(listener)
+
+    def subscribe_news(self, listener: NewsListener) -> None:
+        """Have `listener` told of what other processes saved."""
+        self._news_listeners.append(listener)
 
     async def append_scans(
         self, site: str, robot: str, scans: Sequence[NewScan], *, processed: int, limit: int
@@ -110,20 +101,18 @@ class SqliteStore:
     async def delete_site(self, site: str) -> int | None:
         """Forget a site; its rows are removed in the background."""
         site_id = await self._write(partial(actions.delete_site, site_name=site))
-        if site_id is not None:
-            record = self._records.get(site)
-            if record is not None and record.id == site_id:
-                del self._records[site]
-            if self._purge is None or self._purge.done():
-                self._purge = asyncio.create_task(self._purge_deleted())
+        if site_id is not None and (self._purge is None or self._purge.done()):
+            self._purge = asyncio.create_task(self._purge_deleted())
         return site_id
 
     async def sites(self) -> list[SiteRecord]:
         """All sites by name."""
+        await self._catch_up()
         return [self._records[name] for name in sorted(self._records)]
 
     async def site(self, site: str) -> SiteRecord | None:
         """One site."""
+        await self._catch_up()
         return self._records.get(site)
 
     async def read_feed(self, site_id: int, after: int, limit: int) -> list[LogEntry]:
@@ -132,7 +121,7 @@ class SqliteStore:
 
     async def record_skip(self, site_id: int, position: int, reason: str) -> Skip:
         """Note that an entry is never fed again."""
-        return await self._write(
+        return await self._write_as_engine(
             partial(actions.record_skip, site_id=site_id, position=position, reason=reason)
         )
 
@@ -142,7 +131,9 @@ class SqliteStore:
 
     async def save_snapshot(self, site_id: int, snapshot: SnapshotRecord) -> None:
         """Keep a snapshot."""
-        await self._write(partial(actions.save_snapshot, site_id=site_id, snapshot=snapshot))
+        await self._write_as_engine(
+            partial(actions.save_snapshot, site_id=site_id, snapshot=snapshot)
+        )
 
     async def latest_snapshot(self, site_id: int, producer: str) -> SnapshotRecord | None:
         """Return the newest snapshot that `producer` wrote."""
@@ -150,11 +141,15 @@ class SqliteStore:
 
     async def drop_snapshot(self, site_id: int, position: int) -> None:
         """Remove an unreadable snapshot."""
-        await self._write(partial(actions.drop_snapshot, site_id=site_id, position=position))
+        await self._write_as_engine(
+            partial(actions.drop_snapshot, site_id=site_id, position=position)
+        )
 
     async def append_events(self, site_id: int, batch: EventBatch, kept: int) -> None:
         """Keep the events of a published view."""
-        await self._write(partial(actions.append_events, site_id=site_id, batch=batch, kept=kept))
+        await self._write_as_engine(
+            partial(actions.append_events, site_id=site_id, batch=batch, kept=kept)
+        )
 
     async def read_events(self, site_id: int, after: int, limit: int) -> list[EventBatch]:
         """Return batches of events."""
@@ -166,39 +161,72 @@ class SqliteStore:
         """Return the newest batch of events."""
         return await self._read(partial(reads.read_last_events, site_id=site_id))
 
+    async def save_view(self, site_id: int, view: ViewRecord) -> None:
+        """Keep a view for other processes. Not by the writer: a large one delays no scans."""
+        work = partial(actions.save_view, site_id=site_id, view=view, term=self._term)
+        try:
+            await self._database.write(work)
+        except (SQLAlchemyError, OSError) as error:
+            raise StoreError(f"the storage failed: {type(error).__name__}") from error
+
+    async def view(self, site_id: int, after: int) -> ViewRecord | None:
+        """Return the view that was saved last, unless it is not after position `after`."""
+        return await self._read(partial(reads.read_view, site_id=site_id, after=after))
+
+    async def claim_mapping(self, *, wait: bool) -> Claim:
+        """Become the process that maps."""
+        claim = await self._database.claim(wait=wait)
+        self._term = await self._write(actions.begin_term)
+        return claim
+
     def _on_commit(self, record: SiteRecord) -> None:
-        self._records[record.name] = record
+        former = self._records.get(record.name)
+        if not record.deleted:
+            self._records[record.name] = record
+        elif former is not None and former.id == record.id:
+            del self._records[record.name]
         for listener in self._listeners:
             listener(record)
 
+    def _on_notice(self, text: str) -> None:
+        what, _, number = text.partition(" ")
+        if what in NEWS:
+            for listener in self._news_listeners:
+                listener(NEWS[what], int(number))
+            return
+        # An own commit, or one seen already, is no news; lost notices may have been.
+        news = what != "commit" or int(number) > self._writer.revision
+        if news and (self._refresh is None or self._refresh.done()):
+            self._refresh = asyncio.create_task(self._catch_up())
+
+    async def _catch_up(self) -> None:
+        """See what other processes have committed before this call."""
+        if not self.shared:
+            return
+        revision = await self._read(reads.read_revision)
+        if revision != self._writer.revision:
+            await self._writer.refresh()
+
     async def _write(self, action: Callable[[Transaction], T]) -> T:
-        if self._writer is None:
-            raise StoreError("the storage is not open")
         return await self._writer.submit(action)
 
-    async def _read(self, query: Callable[[Connection], T]) -> T:
-        engine, readers = self._engine, self._readers
-        if engine is None or readers is None:
-            raise StoreError("the storage is not open")
+    async def _write_as_engine(self, action: Callable[[Transaction], T]) -> T:
+        """Write what only the one engine may write."""
+        term = self._term
 
-        def run() -> T:
-            with engine.connect() as connection:
-                return query(connection)
+        def guarded(tx: Transaction) -> T:
+            actions.check_term(tx.term, term)
+            return action(tx)
 
+        return await self._write(guarded)
+
+    async def _read(self, query: Work[T]) -> T:
         try:
-            return await asyncio.get_running_loop().run_in_executor(readers, run)
-        except SQLAlchemyError as error:
+            return await self._database.read(query)
+        except (SQLAlchemyError, OSError) as error:
             _LOG.exception("a read failed")
             raise StoreError(f"the storage failed: {type(error).__name__}") from error
 
     async def _purge_deleted(self) -> None:
         while await self._write(actions.purge_portion):
             await asyncio.sleep(0.01)
-
-
-def _upgrade(engine: Engine, path: Path) -> None:
-    try:
-        with engine.begin() as connection:
-            migrate(connection)
-    except SQLAlchemyError as error:
-        raise StoreError(f"cannot use the database {path}: {error}") from error

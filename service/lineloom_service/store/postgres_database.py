@@ -1,0 +1,166 @@
+"""A PostgreSQL database, which several processes may share."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import socket
+from typing import Any, TypeVar
+
+from sqlalchemy import Connection, text
+from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, create_async_engine
+
+from lineloom_service.store.database import Claim, ClaimedError, NoticeListener, Work
+from lineloom_service.store.migrate import migrate
+from lineloom_service.store.records import StoreError
+
+T = TypeVar("T")
+
+_LOG = logging.getLogger(__name__)
+
+_UPGRADE_LOCK, _MAPPING_LOCK = 0x4C4C_0001, 0x4C4C_0002
+"""Advisory locks; they count within one database and end with the session that holds them."""
+
+_POOL_SIZE = 8
+_AGAIN_S = 1.0
+_LOST = (SQLAlchemyError, OSError)
+
+_WHO_MAPS = text(
+    "SELECT application_name FROM pg_stat_activity JOIN pg_locks USING (pid)"
+    f" WHERE locktype = 'advisory' AND granted AND objid = {_MAPPING_LOCK}"
+    " AND database = (SELECT oid FROM pg_database WHERE datname = current_database())"
+)
+
+
+class PostgresDatabase:
+    """Implements `store.database.Database` on a server, by asyncpg."""
+
+    shared = True
+
+    def __init__(self, url: str) -> None:
+        # The name shows in pg_stat_activity, and tells others who maps.
+        name = f"lineloom on {socket.gethostname()}, process {os.getpid()}"
+        settings = {"application_name": name[:63], "synchronous_commit": "on"}
+        self._engine: AsyncEngine = create_async_engine(
+            url, pool_size=_POOL_SIZE, connect_args={"server_settings": settings, "timeout": 10}
+        )
+        # All statements of a read see one state of the tables.
+        self._reads = self._engine.execution_options(isolation_level="REPEATABLE READ")
+        self._listeners: list[NoticeListener] = []
+        self._listening: asyncio.Task[None] | None = None
+        self._holding: AsyncConnection | None = None
+
+    async def open(self) -> None:
+        """Upgrade the tables, one process at a time, and listen."""
+        try:
+            await self.write(_upgrade)
+        except _LOST as error:
+            await self._engine.dispose()
+            where = self._engine.url.render_as_string(hide_password=True)
+            raise StoreError(f"cannot use the database {where}: {_first_line(error)}") from error
+        self._listening = asyncio.create_task(self._listen(), name="lineloom-listen")
+
+    async def close(self) -> None:
+        """Disconnect; the right to map, if it was ours, is free."""
+        if self._listening is not None:
+            self._listening.cancel()
+            await asyncio.gather(self._listening, return_exceptions=True)
+        if self._holding is not None:
+            await self._holding.invalidate()
+            await self._holding.close()
+        await self._engine.dispose()
+
+    async def read(self, work: Work[T]) -> T:
+        """Run work on a state of the tables that does not change meanwhile."""
+        async with self._reads.connect() as connection:
+            return await connection.run_sync(work)
+
+    async def write(self, work: Work[T]) -> T:
+        """Run work and commit."""
+        async with self._engine.begin() as connection:
+            return await connection.run_sync(work)
+
+    def listen(self, listener: NoticeListener) -> None:
+        """Have `listener` told of notices."""
+        self._listeners.append(listener)
+
+    async def claim(self, *, wait: bool) -> Claim:
+        """Take the lock of the one who maps, in a session that holds it from then on."""
+        while True:
+            try:
+                return await self._claim(wait)
+            except _LOST as error:
+                if not wait:
+                    raise StoreError(f"the storage failed: {_first_line(error)}") from error
+                _LOG.warning("the database is out of reach: %s", _first_line(error))
+                await asyncio.sleep(_AGAIN_S)
+
+    async def _claim(self, wait: bool) -> Claim:
+        session = await self._own_session()
+        try:
+            if wait:
+                await session.execute(text(f"SELECT pg_advisory_lock({_MAPPING_LOCK})"))
+            else:
+                tried = await session.execute(text(f"SELECT pg_try_advisory_lock({_MAPPING_LOCK})"))
+                if not tried.scalar_one():
+                    holder = (await session.execute(_WHO_MAPS)).scalar() or "unknown"
+                    raise ClaimedError(
+                        f"another mapping engine ({holder}) has this database; there can be one"
+                    )
+        except BaseException:
+            await session.invalidate()
+            await session.close()
+            raise
+        claim = Claim()
+        await _on_end(session, claim.lost)
+        self._holding = session
+        return claim
+
+    async def _own_session(self) -> AsyncConnection:
+        """Return a connection that stays out of the pool, and out of any transaction."""
+        connection = await self._engine.connect()
+        return await connection.execution_options(isolation_level="AUTOCOMMIT")
+
+    async def _listen(self) -> None:
+        """Hand on notices for as long as the process runs, through any loss of the connection."""
+        while True:
+            try:
+                session = await self._own_session()
+                try:
+                    ended = asyncio.Event()
+                    await _on_end(session, ended)
+                    raw = (await session.get_raw_connection()).driver_connection
+                    assert raw is not None
+                    await raw.add_listener("lineloom", lambda *notice: self._tell(notice[-1]))
+                    self._tell("")  # whatever was said before nobody heard
+                    await ended.wait()
+                finally:
+                    await session.invalidate()
+                    await session.close()
+            except _LOST as error:
+                _LOG.warning("no notices from the database: %s", _first_line(error))
+            await asyncio.sleep(_AGAIN_S)
+
+    def _tell(self, notice: str) -> None:
+        for listener in self._listeners:
+            listener(notice)
+
+
+async def _on_end(session: AsyncConnection, ended: asyncio.Event) -> None:
+    """Set `ended` when the server or the network ends the session."""
+    raw: Any = (await session.get_raw_connection()).driver_connection
+    raw.add_termination_listener(lambda _: ended.set())
+
+
+def _upgrade(connection: Connection) -> None:
+    connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({_UPGRADE_LOCK})")
+    if connection.exec_driver_sql("SHOW fsync").scalar() != "on":
+        _LOG.warning("fsync is off on this server: what it commits may be lost")
+    migrate(connection)
+
+
+def _first_line(error: BaseException) -> str:
+    text = str(getattr(error, "orig", None) or error).strip()
+    return text.splitlines()[0] if text else type(error).__name__
