@@ -121,21 +121,26 @@ def _cast(
     dx: float,
     dy: float,
     limit: float,
-) -> float:
-    """Walk one beam through the grid, cell by cell; the first hit in the cell at hand ends it."""
+) -> tuple[float, int]:
+    """Walk one beam through the grid, cell by cell; the first hit in the cell at hand ends it.
+
+    Returns the distance and which wall was hit: infinity and -1 for none.
+    """
     t, t_end = _enter(ox, dx, origin_x, origin_x + columns * cell, 0.0, limit)
     t, t_end = _enter(oy, dy, origin_y, origin_y + rows * cell, t, t_end)
     if t > t_end:
-        return math.inf
+        return math.inf, -1
     c = max(0, min(columns - 1, math.floor((ox + t * dx - origin_x) / cell)))
     r = max(0, min(rows - 1, math.floor((oy + t * dy - origin_y) / cell)))
     step_c, next_x, per_x = _stride(ox, dx, origin_x, cell, c)
     step_r, next_y, per_y = _stride(oy, dy, origin_y, cell, r)
-    best = math.inf
+    best, wall = math.inf, -1
     while 0 <= c < columns and 0 <= r < rows and t <= t_end:
         at = r * columns + c
         for k in range(starts[at], starts[at + 1]):
-            best = min(best, _hit(walls, members[k], ox, oy, dx, dy))
+            distance = _hit(walls, members[k], ox, oy, dx, dy)
+            if distance < best:
+                best, wall = distance, members[k]
         t = min(next_x, next_y)
         if best <= t:
             break
@@ -145,7 +150,9 @@ def _cast(
         else:
             r += step_r
             next_y += per_y
-    return best if best <= limit else math.inf
+    if best > limit:
+        return math.inf, -1
+    return best, wall
 
 
 @njit(cache=True)
@@ -167,10 +174,46 @@ def cast_beams(
     ranges = np.empty(directions.shape[0])
     for i in range(directions.shape[0]):
         dx, dy = math.cos(directions[i]), math.sin(directions[i])
-        ranges[i] = _cast(
+        ranges[i], _ = _cast(
             walls, starts, members, origin_x, origin_y, cell, columns, rows, ox, oy, dx, dy, limit
         )
     return ranges
+
+
+@njit(cache=True)
+def seen_surfaces(
+    walls: Floats,
+    starts: Ints,
+    members: Ints,
+    origin_x: float,
+    origin_y: float,
+    cell: float,
+    columns: int,
+    rows: int,
+    ox: float,
+    oy: float,
+    directions: Floats,
+    limit: float,
+    piece: float,
+) -> Ints:
+    """Return per direction the wall that ends the beam, its piece and its side; -1, 0, 0 for none.
+
+    Shape (n, 3). A wall's pieces are `piece` [m] long and are counted from its first end; side 1
+    lies left of the wall's direction, 0 right of it.
+    """
+    seen = np.zeros((directions.shape[0], 3), dtype=np.int64)
+    for i in range(directions.shape[0]):
+        dx, dy = math.cos(directions[i]), math.sin(directions[i])
+        distance, wall = _cast(
+            walls, starts, members, origin_x, origin_y, cell, columns, rows, ox, oy, dx, dy, limit
+        )
+        seen[i, 0] = wall
+        if wall >= 0:
+            x1, y1, x2, y2 = walls[wall, 0], walls[wall, 1], walls[wall, 2], walls[wall, 3]
+            along = math.hypot(ox + distance * dx - x1, oy + distance * dy - y1)
+            seen[i, 1] = int(along / piece)
+            seen[i, 2] = 1 if (x2 - x1) * (oy - y1) - (y2 - y1) * (ox - x1) > 0.0 else 0
+    return seen
 
 
 @njit(cache=True)

@@ -25,6 +25,8 @@ class Blueprint:
 
     name: str
     segments: list[tuple[float, float, float, float]] = field(default_factory=list)
+    doorways: list[tuple[float, float, float, float]] = field(default_factory=list)
+    """Centre lines of all openings in thick walls: where a door may be closed."""
 
     def line(self, start: Point, end: Point) -> None:
         """Draw one thin segment, such as the leaf of an open door."""
@@ -72,6 +74,15 @@ class Blueprint:
         for a, b in zip(edges[::2], edges[1::2], strict=True):
             middle = (start[0] + 0.5 * (a + b) * u[0], start[1] + 0.5 * (a + b) * u[1])
             self.box(middle, b - a, thickness, math.atan2(u[1], u[0]))
+        for a, b in openings:
+            self.doorways.append(
+                (
+                    start[0] + a * u[0],
+                    start[1] + a * u[1],
+                    start[0] + b * u[0],
+                    start[1] + b * u[1],
+                )
+            )
 
     def door_leaf(self, hinge: Point, width: float, angle: float) -> None:
         """Draw an open door's leaf of `width` [m] from its hinge along `angle` [rad]."""

@@ -35,6 +35,12 @@ def long_corridor(length: float = 45.0, width: float = 2.2, spacing: float = 3.0
     tells one stretch from the next: the hardest place to be recognised in.
     """
     plan = Blueprint("long-corridor")
+    draw_niched_corridor(plan, length, width, spacing)
+    return plan.world()
+
+
+def draw_niched_corridor(plan: Blueprint, length: float, width: float, spacing: float) -> None:
+    """Draw the outline of `long_corridor`, its lower left corner at the origin."""
     count = int((length - 2.0) // spacing) + 1
     first = 0.5 * (length - (count - 1) * spacing)
     for wall, out in ((0.0, -0.25), (width, 0.25)):
@@ -49,7 +55,6 @@ def long_corridor(length: float = 45.0, width: float = 2.2, spacing: float = 3.0
         plan.line((at, wall), (length, wall))
     plan.line((0.0, 0.0), (0.0, width))
     plan.line((length, 0.0), (length, width))
-    return plan.world()
 
 
 def rooms(seed: int = 0) -> World:

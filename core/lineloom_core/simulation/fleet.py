@@ -23,7 +23,8 @@ from lineloom_core.simulation.world import World
 
 _EPOCH_S = 1_700_000_000.0
 _CLOCK_SPREAD_S = 30.0 * 86_400.0
-_PATH_STEP_M = 0.25
+PATH_STEP_M = 0.25
+"""Between two points of `Fleet.paths`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +94,7 @@ class Fleet:
             yield simulated
 
     def paths(self) -> list[NDArray[np.float64]]:
-        """Return each robot's way, one point every 0.25 m, shape (n, 2) [m, world frame]."""
+        """Return each robot's way, one point every `PATH_STEP_M`, shape (n, 2) [m, world frame]."""
         return [_way(robot) for robot in self.robots]
 
     def overlap_m(self, within_m: float = 1.5) -> NDArray[np.float64]:
@@ -107,7 +108,7 @@ class Fleet:
         for i, a in enumerate(ways):
             for j, b in enumerate(ways):
                 gaps = np.min(np.hypot(*(a[:, None, :] - b[None, :, :]).transpose(2, 0, 1)), axis=1)
-                table[i, j] = _PATH_STEP_M * float(np.count_nonzero(gaps <= within_m))
+                table[i, j] = PATH_STEP_M * float(np.count_nonzero(gaps <= within_m))
         return table
 
 
@@ -153,11 +154,11 @@ def _way(robot: SimulatedRobot) -> NDArray[np.float64]:
     end = robot.drive.duration_s if robot.duration_s is None else robot.duration_s
     fine = robot.drive.positions(np.arange(0.0, end + 1e-9, 0.05))
     travelled = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(fine, axis=0).T))])
-    marks = np.searchsorted(travelled, np.arange(0.0, travelled[-1] + 1e-9, _PATH_STEP_M))
+    marks = np.searchsorted(travelled, np.arange(0.0, travelled[-1] + 1e-9, PATH_STEP_M))
     return fine[np.minimum(marks, len(fine) - 1)]
 
 
 def _thinned(way: NDArray[np.float64]) -> NDArray[np.float64]:
-    cells = np.floor(way / _PATH_STEP_M).astype(np.int64)
+    cells = np.floor(way / PATH_STEP_M).astype(np.int64)
     _, first = np.unique(cells, axis=0, return_index=True)
     return way[np.sort(first)]

@@ -22,6 +22,7 @@ from itertools import pairwise
 import numpy as np
 
 from lineloom_core.simulation.blueprint import WALL_THICKNESS_M, Blueprint
+from lineloom_core.simulation.building import Building
 from lineloom_core.simulation.furniture import STYLES, Rectangle, Room, duct, furnish, shelf
 from lineloom_core.simulation.world import World
 
@@ -55,6 +56,26 @@ def office_floor(seed: int = 0) -> World:
 
     The same seed gives the same floor. Every room can be reached by a robot of 0.3 m radius.
     """
+    return office_building(seed).world
+
+
+def office_building(seed: int = 0, furniture_seed: int | None = None) -> Building:
+    """Return `office_floor` with its doorways; every piece of furniture is telling.
+
+    furniture_seed: draws the furniture alone, so that floors of one seed share their walls; None
+    lets the walls' own stream go on.
+    """
+    floor = _draw_walls(seed)
+    furniture = Blueprint("furniture")
+    rng = floor.rng if furniture_seed is None else np.random.default_rng([furniture_seed, 5])
+    for index, room in enumerate(floor.rooms):
+        style = STYLES[(index + int(rng.integers(2))) % len(STYLES)]
+        furnish(furniture, room, rng, style)
+    _furnish_corridor(floor, furniture, rng)
+    return Building.of(floor.plan, furniture)
+
+
+def _draw_walls(seed: int) -> _Floor:
     rng = np.random.default_rng(seed)
     left, right = float(rng.uniform(5.2, 6.2)), _WIDTH_M - float(rng.uniform(5.2, 6.2))
     low, high = float(rng.uniform(4.6, 5.4)), _HEIGHT_M - float(rng.uniform(4.6, 5.4))
@@ -72,11 +93,7 @@ def office_floor(seed: int = 0) -> World:
     _draw_wing(floor, 0.0, left, door_right=True)
     _draw_wing(floor, right, _WIDTH_M, door_right=False)
     _draw_core(floor)
-    for index, room in enumerate(floor.rooms):
-        style = STYLES[(index + int(rng.integers(2))) % len(STYLES)]
-        furnish(floor.plan, room, rng, style)
-    _furnish_corridor(floor)
-    return floor.plan.world()
+    return floor
 
 
 def _draw_shell(floor: _Floor) -> None:
@@ -244,7 +261,7 @@ def _draw_block(floor: _Floor, x0: float, x1: float, *, is_bay: bool) -> None:
     floor.rooms += [lower, upper] if split else [lower]
 
 
-def _furnish_corridor(floor: _Floor) -> None:
+def _furnish_corridor(floor: _Floor, furniture: Blueprint, rng: np.random.Generator) -> None:
     """Line the corridor with ducts, cabinets and pilasters, never in front of a door."""
     cx0, cy0, cx1, cy1 = floor.core
     h = _HALF_WALL_M
@@ -257,4 +274,4 @@ def _furnish_corridor(floor: _Floor) -> None:
     doors = [area for room in floor.rooms for area in room.keep_free]
     for leg, pieces in zip(legs, (8, 8, 3, 3), strict=True):
         corridor = Room(leg, keep_free=doors + floor.mouths)
-        furnish(floor.plan, corridor, floor.rng, [duct, shelf] * pieces)
+        furnish(furniture, corridor, rng, [duct, shelf] * pieces)

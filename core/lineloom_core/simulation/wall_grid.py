@@ -69,3 +69,27 @@ class WallGrid:
             float(limit),
         )
         return ranges
+
+    def surfaces(
+        self, x: float, y: float, directions: ArrayLike, limit: float, piece: float
+    ) -> NDArray[np.int64]:
+        """Return what each beam of shape (n,) [rad] ends on: rows wall, piece of it, side, (n, 3).
+
+        Pieces are `piece` [m] long. Wall -1 where none is met within `limit` [m].
+        """
+        beams = np.ascontiguousarray(directions, dtype=np.float64)
+        seen: NDArray[np.int64] = _kernels.seen_surfaces(
+            self.walls,
+            self.starts,
+            self.members,
+            *self.origin,
+            self.cell,
+            self.columns,
+            self.rows,
+            float(x),
+            float(y),
+            beams,
+            float(limit),
+            float(piece),
+        )
+        return seen

@@ -52,6 +52,35 @@ def slow_clearance(walls: Floats, p: Floats, q: Floats) -> float:
     return best
 
 
+def slow_surface(walls: Floats, x: float, y: float, hit: Floats, piece: float) -> list[int]:
+    """Find the wall that a beam's end lies on, how far along it, and on which side we stand."""
+    for number, (x1, y1, x2, y2) in enumerate(walls):
+        wall = np.array([x2 - x1, y2 - y1])
+        length, to_hit = float(np.hypot(*wall)), hit - (x1, y1)
+        across = (wall[0] * to_hit[1] - wall[1] * to_hit[0]) / length
+        along = float(wall @ to_hit) / length
+        if abs(across) < 1e-9 and -1e-9 <= along <= length + 1e-9:
+            left = wall[0] * (y - y1) - wall[1] * (x - x1) > 0.0
+            return [number, math.floor(along / piece), int(left)]
+    raise AssertionError("the beam ends in mid-air")
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_surfaces_are_those_that_the_slow_twin_finds(seed: int) -> None:
+    world, rng = random_world(seed), np.random.default_rng(200 + seed)
+    directions = rng.uniform(-7.0, 7.0, 150)
+    x, y = (float(v) for v in rng.uniform([-10.0, -6.0], [10.0, 6.0]))
+    ranges = world.cast(x, y, directions, 9.0)
+    found = world.grid.surfaces(x, y, directions, 9.0, 0.25)
+    assert np.isfinite(ranges).sum() > 50
+    for direction, reach, surface in zip(directions, ranges, found.tolist(), strict=True):
+        if np.isfinite(reach):
+            hit = np.array([x + reach * math.cos(direction), y + reach * math.sin(direction)])
+            assert surface == slow_surface(world.walls, x, y, hit, 0.25)
+        else:
+            assert surface == [-1, 0, 0]
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_beams_end_where_the_slow_twin_says(seed: int) -> None:
     world, rng = random_world(seed), np.random.default_rng(100 + seed)

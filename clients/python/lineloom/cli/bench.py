@@ -1,8 +1,7 @@
-"""`lineloom bench`: how good the matchers are, measured here."""
+"""`lineloom bench`: how good the matchers and the merging are, measured here."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,8 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from lineloom.cli import options
+from lineloom.cli.bench_merges import merges
 from lineloom.cli.console import note, out, print_json
 from lineloom.cli.failure import CommandError, Exit
+from lineloom.cli.one_thread import use_one_thread
 
 if TYPE_CHECKING:
     from lineloom_core.evaluation.pair_bench_contestants import Contestant
@@ -22,17 +23,17 @@ if TYPE_CHECKING:
 SHARED_PAIRS = Path(__file__).resolve().parents[5] / "shared" / "data" / "pairs"
 """Where the real pairs lie beside a checkout: `../shared/data/pairs` from the project's root."""
 
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
+app.command("merges")(merges)
 
 
 @app.callback()
 def bench() -> None:
-    """Measure how good the matchers are.
+    """Measure how good the matchers are, and how safe the merging.
 
     \b
     Example:
+      lineloom bench merges --quick
       lineloom bench pairs --limit 10
     """
 
@@ -84,9 +85,7 @@ def pairs(
       lineloom bench pairs --matchers lineloom,baselines --simulated 0 --json
       lineloom bench pairs --matchers lineloom --worst out/worst
     """
-    for variable in _ONE_THREAD:
-        # Before the core is loaded: threads that wait for work would count as CPU time.
-        os.environ.setdefault(variable, "1")
+    use_one_thread()
     try:
         from lineloom_core.evaluation.pair_bench import run_pair_bench
         from lineloom_core.evaluation.pair_bench_report import to_json, to_markdown
