@@ -193,6 +193,10 @@ def to_constraint(constraint: ConstraintView, robots: Mapping[int, str]) -> wire
         checks=_figures(constraint.checks),
         consistency_set=list(constraint.consistency_set),
         residual=constraint.residual,
+        history=[
+            wire.StateChange(version=h.version, state=h.state, reason=h.reason)
+            for h in constraint.history
+        ],
     )
 
 

@@ -16,6 +16,14 @@ from pathlib import Path
 
 import numpy as np
 from lineloom_core.geometry import Pose
+from lineloom_core.mapping.answers import (
+    Evidence,
+    Limit,
+    MatchedLines,
+    RobotMove,
+    RunnerUp,
+    WhatIf,
+)
 from lineloom_core.mapping.changes import Changes
 from lineloom_core.mapping.site_view import (
     ComponentView,
@@ -24,6 +32,7 @@ from lineloom_core.mapping.site_view import (
     MapLine,
     RobotView,
     SiteView,
+    StateChange,
     TrajectoryView,
 )
 from lineloom_core.scan import Mount, Scan
@@ -45,6 +54,7 @@ class FakeMapper:
         self._version = 0
         self._scans: dict[str, list[tuple[str, int, float]]] = {}
         self._mounts: dict[str, Mount] = {}
+        self._retracted: dict[str, int] = {}
 
     def add(self, robot: str, scan: Scan) -> Changes:
         if SECONDS_PER_SCAN:
@@ -70,6 +80,41 @@ class FakeMapper:
         self._version += 1
         self._link(robot, "forget", b"")
         self._scans.pop(robot, None)
+
+    def retract(self, constraint: str) -> None:
+        self._version += 1
+        self._link("retract", constraint)
+        self._retracted[constraint] = self._version
+
+    def reinstate(self, constraint: str) -> None:
+        self._version += 1
+        self._link("restore", constraint)
+        self._retracted.pop(constraint, None)
+
+    def explain(self, constraint: str) -> Evidence:
+        if constraint == "k-rejected":
+            raise ValueError("there is nothing to say")
+        return Evidence(
+            constraint=constraint,
+            limits={"conflict": Limit(None, 0.1, True)},
+            matched=(MatchedLines((0, 0, 1, 0), (0, 0, 1, 0.1), 1.0, 0.05, 0.1),),
+            reference=np.array([[0.0, 0.0, 1.0, 0.0]]),
+            current=np.array([[0.0, 0.0, 1.0, 0.1]]),
+            conflicts=np.array([[0.5, 0.5]]),
+            votes=12.0,
+            runner_up=RunnerUp(1.0, 2.0, 0.5, 3.0),
+            margin=0.4,
+        )
+
+    def what_if(self, constraint: str) -> WhatIf:
+        robots = tuple(sorted(self._scans))
+        return WhatIf(
+            "restore" if constraint in self._retracted else "retract",
+            constraint,
+            {"c1": robots},
+            {"c1": robots[:1], "c2": robots[1:]},
+            tuple(RobotMove(r, "c1", "c1", 0.1 * i, 0.0) for i, r in enumerate(robots)),
+        )
 
     def view(self) -> SiteView:
         keyframes = tuple(self._keyframes())
@@ -149,7 +194,7 @@ class FakeMapper:
             ConstraintView(
                 id=f"k{a.id}-{b.id}",
                 kind="rendezvous",
-                state="accepted",
+                state="retracted" if f"k{a.id}-{b.id}" in self._retracted else "accepted",
                 keyframe_a=a.id,
                 keyframe_b=b.id,
                 T_a_b=Pose(0.0, 0.0, 0.0),
@@ -157,6 +202,7 @@ class FakeMapper:
                 reason="they met",
                 checks={"conflict": 0.02, "unknown": float("nan")},
                 residual=0.5,
+                history=(StateChange(1, "accepted", "they met"),),
             )
             for a, b in itertools.pairwise(linked)
         ]

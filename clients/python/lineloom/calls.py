@@ -21,6 +21,8 @@ from lineloom.scan_like import ScanLike, to_match_scan
 from lineloom.wire import (
     JSON,
     MSGPACK,
+    Constraint,
+    ConstraintDetail,
     ConstraintPage,
     Graph,
     IngestAnswer,
@@ -38,6 +40,7 @@ from lineloom.wire import (
     SiteList,
     Trajectory,
     Transform,
+    WhatIf,
     pack_json,
     pack_msgpack,
 )
@@ -164,6 +167,28 @@ def events(site: str, follow: bool) -> Call[None]:
     return Call("GET", f"{_site(site)}/events", lambda _: None, params=params, headers=headers)
 
 
+def constraint(site: str, constraint_id: str) -> Call[ConstraintDetail]:
+    """GET one constraint with its evidence."""
+    return Call("GET", _constraint(site, constraint_id), _model(ConstraintDetail))
+
+
+def constraint_svg(site: str, constraint_id: str) -> Call[str]:
+    """GET a drawing of a constraint's evidence."""
+    return Call("GET", _constraint(site, constraint_id), _text, params={"format": "svg"})
+
+
+def act_on_constraint(
+    site: str, constraint_id: str, action: Literal["retract", "restore"]
+) -> Call[Constraint]:
+    """POST that a constraint is to be retracted, or restored."""
+    return Call("POST", f"{_constraint(site, constraint_id)}/{action}", _model(Constraint))
+
+
+def what_if(site: str, constraint_id: str) -> Call[WhatIf]:
+    """POST the question what retracting (or restoring) a constraint would do."""
+    return Call("POST", f"{_constraint(site, constraint_id)}/what-if", _model(WhatIf))
+
+
 def match(reference: ScanLike, current: ScanLike) -> Call[MatchAnswer]:
     """POST two scans, to learn how they lie to each other."""
     request = MatchRequest.model_construct(
@@ -250,6 +275,10 @@ def _map_params(format: str, component: str | None, bbox: Box | None) -> dict[st
 
 def _site(name: str) -> str:
     return f"/v1/sites/{_name(name)}"
+
+
+def _constraint(site: str, constraint_id: str) -> str:
+    return f"{_site(site)}/constraints/{_name(constraint_id)}"
 
 
 def _robot(site: str, robot: str) -> str:

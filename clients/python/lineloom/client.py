@@ -18,6 +18,7 @@ from lineloom.session import DEFAULT_BATCH, BatchTotal, Session, not_idle, not_r
 from lineloom.wire import (
     AnyEvent,
     Constraint,
+    ConstraintDetail,
     ConstraintPage,
     Graph,
     IngestAnswer,
@@ -32,6 +33,7 @@ from lineloom.wire import (
     SiteList,
     Trajectory,
     Transform,
+    WhatIf,
 )
 
 _FIRST_POLL = 0.05
@@ -171,6 +173,26 @@ class Client:
             cursor = page.next_cursor
             if cursor is None:
                 return
+
+    def constraint(self, site: str, constraint: str) -> ConstraintDetail:
+        """Return a constraint with all of its evidence."""
+        return self._send(calls.constraint(site, constraint))
+
+    def constraint_svg(self, site: str, constraint: str) -> str:
+        """Return a drawing of a constraint's evidence."""
+        return self._send(calls.constraint_svg(site, constraint))
+
+    def retract(self, site: str, constraint: str) -> Constraint:
+        """Make the map as if a constraint had never been accepted; return what became of it."""
+        return self._send(calls.act_on_constraint(site, constraint, "retract"))
+
+    def restore(self, site: str, constraint: str) -> Constraint:
+        """Take a retraction back; return what became of the constraint."""
+        return self._send(calls.act_on_constraint(site, constraint, "restore"))
+
+    def what_if(self, site: str, constraint: str) -> WhatIf:
+        """Return what retracting a constraint, or restoring a retracted one, would do."""
+        return self._send(calls.what_if(site, constraint))
 
     def match(self, reference: ScanLike, current: ScanLike) -> MatchAnswer:
         """Return where `current` was taken, seen from `reference`; adds nothing to any map."""

@@ -40,14 +40,14 @@ def join(site: SiteMap, root: int, keyframe: int) -> ComponentMerged | None:
     if share > site.config.join.most_conflict:
         _wait(site, chosen, f"the maps contradict each other there ({100 * share:.0f} %)")
         return None
-    merged = _accept(site, chosen, b_root, T_A_B, share)
+    merged = _accept(site, chosen, b_root, T_A_B, _figures(site, chosen, rival, share))
     _drop_others(site, candidates, chosen)
     site.optimise(a_root)
     return merged
 
 
 def _accept(
-    site: SiteMap, chosen: list[Constraint], b_root: int, T_A_B: Pose, share: float
+    site: SiteMap, chosen: list[Constraint], b_root: int, T_A_B: Pose, figures: dict[str, float]
 ) -> ComponentMerged:
     """Carry b's component into a's frame and put the set into the graph."""
     survivor, absorbed = (
@@ -59,9 +59,22 @@ def _accept(
         accepted = constraint.moved_to(
             "accepted", f"{len(ids)} constraints agree", site.now, consistency_set=ids
         )
-        site.add_constraint(replace(accepted, checks={**accepted.checks, "map_conflict": share}))
+        site.add_constraint(replace(accepted, checks={**accepted.checks, **figures}))
     site.merged_into[absorbed] = survivor
     return ComponentMerged(survivor, absorbed, ids)
+
+
+def _figures(
+    site: SiteMap, chosen: list[Constraint], rival: list[Constraint], map_conflict: float
+) -> dict[str, float]:
+    """What the set was held to, for every one of its constraints to show."""
+    return {
+        "set_size": float(len(chosen)),
+        "set_evidence": sum(c.evidence for c in chosen),
+        "rival_evidence": float(sum(c.evidence for c in rival)),
+        "set_distinctive": float(sum(is_distinctive(site, c) for c in chosen)),
+        "map_conflict": map_conflict,
+    }
 
 
 def _wait(site: SiteMap, candidates: list[Constraint], objection: str) -> None:

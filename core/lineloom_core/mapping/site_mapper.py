@@ -15,9 +15,11 @@ from __future__ import annotations
 import pickle
 
 from lineloom_core.mapping.advance import advance
+from lineloom_core.mapping.answers import Action, Evidence, WhatIf
 from lineloom_core.mapping.changes import Changes
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.constraint import Constraint
+from lineloom_core.mapping.explain import explain
 from lineloom_core.mapping.front_end import take
 from lineloom_core.mapping.history import History
 from lineloom_core.mapping.memory import Memory
@@ -27,7 +29,7 @@ from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.mapping.site_view import SiteView
 from lineloom_core.mapping.verdicts import Verdicts
 from lineloom_core.mapping.view_builder import build_view
-from lineloom_core.mapping.what_if import Action, WhatIf, what_if
+from lineloom_core.mapping.what_if import what_if
 from lineloom_core.scan import Mount, Scan
 
 SNAPSHOT_FORMAT = 4
@@ -57,6 +59,11 @@ class SiteMapper:
     def version(self) -> int:
         """Number of log entries processed."""
         return self._version
+
+    @property
+    def config(self) -> MapperConfig:
+        """The parameters."""
+        return self._config
 
     @property
     def verdicts(self) -> Verdicts:
@@ -133,6 +140,11 @@ class SiteMapper:
         )
         other = rebuild(self._config, self._history, self._memory, verdicts.operators_only())
         return what_if(action, constraint, self._site, other, self._robots)
+
+    def explain(self, constraint: str) -> Evidence | None:
+        """What speaks for a constraint and against it; None for an unknown one."""
+        known = self._find(constraint)
+        return None if known is None else explain(self._site, known)
 
     def view(self) -> SiteView:
         """Everything there is to know at this version; changes nothing."""

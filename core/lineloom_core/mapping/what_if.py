@@ -3,40 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Literal
 
 from lineloom_core.geometry import angle_difference
+from lineloom_core.mapping.answers import Action, RobotMove, WhatIf
 from lineloom_core.mapping.robot_record import RobotRecord
 from lineloom_core.mapping.site_map import SiteMap
-
-Action = Literal["retract", "restore"]
-
-
-@dataclass(frozen=True, slots=True)
-class RobotMove:
-    """A robot's latest pose before and after.
-
-    moved [m], turned [rad]: in the frame of the component; None where the robot would change the
-    component, as frames of two components cannot be compared, or has no pose.
-    """
-
-    robot: str
-    component_before: str | None
-    component_after: str | None
-    moved: float | None
-    turned: float | None
-
-
-@dataclass(frozen=True, slots=True)
-class WhatIf:
-    """What the action would do: components with their robots before and after, and every robot."""
-
-    action: Action
-    constraint: str
-    components_before: dict[str, tuple[str, ...]]
-    components_after: dict[str, tuple[str, ...]]
-    robots: tuple[RobotMove, ...]
 
 
 def what_if(

@@ -1,13 +1,15 @@
 """Places: submaps that are recognised without any pose."""
 
-from lineloom_core.places.place import Glimpse, Place, count_points
+from lineloom_core.places.place import Glimpse, Place, conflicting_points, count_points
 from lineloom_core.places.recognition import (
     Recognition,
     RecognitionConfig,
     alias_evidence,
     evidence_elsewhere,
+    evidence_of,
     hypotheses,
     recognise,
+    rivals,
 )
 
 __all__ = [
@@ -16,8 +18,11 @@ __all__ = [
     "Recognition",
     "RecognitionConfig",
     "alias_evidence",
+    "conflicting_points",
     "count_points",
     "evidence_elsewhere",
+    "evidence_of",
     "hypotheses",
     "recognise",
+    "rivals",
 ]

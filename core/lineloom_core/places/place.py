@@ -20,6 +20,7 @@ from lineloom_core.features._kernels import (
 )
 from lineloom_core.fusion import LineObservations, fuse
 from lineloom_core.geometry import Pose
+from lineloom_core.matching._free_space_kernels import CONFLICT, judge_cloud
 from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
 from lineloom_core.matching.local_map import Cloud, LocalMap
 from lineloom_core.places import _kernels
@@ -110,6 +111,24 @@ def count_points(
         T_reference_current.to_array(), 1, TOLERANCE, TOLERANCE_SLOPE, counts,
     )  # fmt: skip
     return float(counts[0]), float(counts[1])
+
+
+def conflicting_points(
+    reference: Place, current: Place, T_reference_current: Pose
+) -> NDArray[np.float64]:
+    """Points (n, 2) of `current`, in its own frame, that stand in free space of `reference`."""
+    points = current.surface.points
+    pose = T_reference_current.to_array()
+    conflict = np.zeros(len(points), dtype=np.bool_)
+    for i in range(len(points)):
+        counts = np.zeros(4)
+        judge_cloud(
+            points[i : i + 1], 1, pose, reference.ranges, reference.angle_mins,
+            reference.angle_increments, reference.sweep_poses, TOLERANCE, TOLERANCE_SLOPE, counts,
+        )  # fmt: skip
+        conflict[i] = counts[CONFLICT] > 0.0
+    found: NDArray[np.float64] = points[conflict]
+    return found
 
 
 def _surface_cloud(local_map: LocalMap) -> Cloud:

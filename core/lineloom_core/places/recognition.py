@@ -153,18 +153,33 @@ def check_alignment(reference: Place, current: Place, registered: Registration) 
     }
 
 
-def evidence_elsewhere(
+def evidence_of(row: NDArray[np.float64]) -> float:
+    """What speaks for a hypothesis, in metres of wall."""
+    return float(_kernels.place_evidence(row[5], row[6], row[9]))
+
+
+def rivals(
     table: NDArray[np.float64], pose: Pose, config: RecognitionConfig, *, slack: float = 0.0
-) -> float:
-    """Evidence of the best hypothesis that is another relative pose than `pose`."""
-    best = 0.0
+) -> tuple[NDArray[np.float64] | None, list[NDArray[np.float64]]]:
+    """The best hypothesis at `pose` (give or take `slack` m), and those elsewhere, best first."""
+    own, others = None, []
     for row in table:
         other = Pose.from_array(row[:3])
         apart = pose.distance(other) > config.rival_distance + slack
         turned = abs(angle_difference(other.theta, pose.theta)) > config.rival_angle
         if apart or turned:
-            best = max(best, float(_kernels.place_evidence(row[5], row[6], row[9])))
-    return best
+            others.append(row)
+        elif own is None:
+            own = row
+    return own, others
+
+
+def evidence_elsewhere(
+    table: NDArray[np.float64], pose: Pose, config: RecognitionConfig, *, slack: float = 0.0
+) -> float:
+    """Evidence of the best hypothesis that is another relative pose than `pose`."""
+    _, others = rivals(table, pose, config, slack=slack)
+    return max((evidence_of(row) for row in others), default=0.0)
 
 
 def _objection(checks: dict[str, float], config: RecognitionConfig) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+from typing import Any
 
 import lineloom_core
 from lineloom_core.mapping.site_view import SiteView
@@ -14,6 +15,8 @@ from lineloom_service.engine.site_runner import Pace, Published, SiteRunner
 from lineloom_service.settings import Settings
 from lineloom_service.store.protocol import Store
 from lineloom_service.store.records import SiteRecord, Skip
+
+_LOOK_AGAIN_S = 0.02
 
 _LOG = logging.getLogger(__name__)
 
@@ -80,6 +83,22 @@ class Conductor:
         """Return the latest view of a site; never waits."""
         runner = self._runners.get(site_id)
         return NOTHING if runner is None or runner.published is None else runner.published
+
+    async def ask(self, site_id: int, question: str, *arguments: object) -> Any:
+        """Ask a site's mapper; it may be in the middle of a chunk of scans.
+
+        Raises WorkerDiedError where it is not running, QuestionFailedError where it cannot say.
+        """
+        return await self._engine.ask(site_id, question, *arguments)
+
+    async def reached(self, site_id: int, position: int, within_s: float) -> bool:
+        """Wait until the published view holds the entry at `position`; False if it takes longer."""
+        deadline = asyncio.get_running_loop().time() + within_s
+        while self.published(site_id).position < position:
+            if asyncio.get_running_loop().time() > deadline:
+                return False
+            await asyncio.sleep(_LOOK_AGAIN_S)
+        return True
 
     def skips(self, site_id: int) -> list[Skip]:
         """Return the entries of a site that are not in its map for good."""

@@ -7,9 +7,12 @@ import logging
 from collections import deque
 from collections.abc import Awaitable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from lineloom_service.engine.mapper import SITE_MAPPER, WARM_UP
 from lineloom_service.engine.messages import (
+    Answered,
+    Ask,
     Failed,
     Fed,
     Feed,
@@ -24,6 +27,7 @@ from lineloom_service.engine.messages import (
 )
 from lineloom_service.engine.protocol import (
     MapperFailedError,
+    QuestionFailedError,
     RestoreFailedError,
     ViewListener,
     WorkerDiedError,
@@ -54,7 +58,7 @@ class _Site:
 
     slot: _Slot
     run: int = 0
-    awaited: deque[asyncio.Future[bytes]] = field(default_factory=deque)
+    awaited: deque[asyncio.Future[Any]] = field(default_factory=deque)
 
     def fail(self, error: Exception) -> None:
         """Let everyone who waits for this site know."""
@@ -144,7 +148,15 @@ class LocalEngine:
     async def snapshot(self, site: int) -> bytes:
         """Ask the site's worker for the mapper's state."""
         hosted = self._sites[site]
-        return await self._ask(hosted, TakeSnapshot(site, hosted.run))
+        data: bytes = await self._ask(hosted, TakeSnapshot(site, hosted.run))
+        return data
+
+    def ask(self, site: int, question: str, *arguments: object) -> Awaitable[Any]:
+        """Ask the site's mapper."""
+        hosted = self._sites.get(site)
+        if hosted is None:
+            raise WorkerDiedError(None, "the site is not hosted yet", killed=False)
+        return self._ask(hosted, Ask(site, hosted.run, question, arguments))
 
     def stop_site(self, site: int) -> None:
         """Host a site no longer."""
@@ -156,9 +168,11 @@ class LocalEngine:
         if hosted.slot.process is not None:
             hosted.slot.process.send(StopSite(site))
 
-    def _ask(self, hosted: _Site, order: StartSite | Feed | TakeSnapshot) -> asyncio.Future[bytes]:
+    def _ask(
+        self, hosted: _Site, order: StartSite | Feed | TakeSnapshot | Ask
+    ) -> asyncio.Future[Any]:
         """Send an order; its answer comes in turn, as a worker obeys in order."""
-        answer: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
+        answer: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
         # Who asked may have stopped waiting: then the exception is nobody's business.
         answer.add_done_callback(lambda done: done.cancelled() or done.exception())
         process = hosted.slot.process
@@ -218,6 +232,12 @@ class LocalEngine:
         asyncio.get_running_loop().call_later(pause, self._spawn, slot)
 
 
-def _resolve(answer: asyncio.Future[bytes], report: Fed | Started | Snapshot) -> None:
-    if not answer.done():
+def _resolve(answer: asyncio.Future[Any], report: Fed | Started | Snapshot | Answered) -> None:
+    if answer.done():
+        return
+    if isinstance(report, Answered) and report.failure is not None:
+        answer.set_exception(QuestionFailedError(report.failure))
+    elif isinstance(report, Answered):
+        answer.set_result(report.value)
+    else:
         answer.set_result(report.data if isinstance(report, Snapshot) else b"")

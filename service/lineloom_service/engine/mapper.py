@@ -15,6 +15,9 @@ from lineloom_service.store.records import LogEntry
 SITE_MAPPER = "lineloom_core.mapping.site_mapper:SiteMapper"
 """Where the mapper is; by name, so that the API process need not import gtsam."""
 
+QUESTIONS = frozenset({"what_if", "explain", "localise"})
+"""Methods of the mapper that answer and change nothing: what `Engine.ask` may name."""
+
 WARM_UP = "lineloom_core.warm_up:warm_up"
 """What a worker calls before it is ready: compiles the mapper's kernels."""
 
@@ -32,6 +35,14 @@ class Mapper(Protocol):
 
     def forget(self, robot: str) -> None:
         """Remove a robot."""
+        ...
+
+    def retract(self, constraint: str) -> None:
+        """Believe a constraint no longer."""
+        ...
+
+    def reinstate(self, constraint: str) -> None:
+        """Take a retraction back."""
         ...
 
     def view(self) -> SiteView:
@@ -69,6 +80,11 @@ def apply(mapper: Mapper, entry: LogEntry) -> None:
     if entry.kind == "mount":
         mount = Mount() if entry.body is None else decode_mount(entry.body)
         mapper.set_mount(entry.robot, mount)
+        return
+    if entry.kind in ("retract", "restore"):
+        constraint = (entry.body or b"").decode()
+        act = mapper.retract if entry.kind == "retract" else mapper.reinstate
+        act(constraint)
         return
     if entry.body is None or entry.session is None or entry.seq is None:
         raise ValueError("a scan entry has no body, session or seq")

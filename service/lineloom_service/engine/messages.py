@@ -44,13 +44,23 @@ class TakeSnapshot:
 
 
 @dataclass(frozen=True, slots=True)
+class Ask:
+    """Answer a question about the map; nothing changes. question: a method of the mapper."""
+
+    site: int
+    run: int
+    question: str
+    arguments: tuple[object, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class StopSite:
     """Host a site no longer."""
 
     site: int
 
 
-Order = StartSite | Feed | TakeSnapshot | StopSite
+Order = StartSite | Feed | TakeSnapshot | Ask | StopSite
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +105,16 @@ class Snapshot:
 
 
 @dataclass(frozen=True, slots=True)
+class Answered:
+    """The answer to a question. failure: why there is none."""
+
+    site: int
+    run: int
+    value: object = None
+    failure: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Failed:
     """The mapper raised; the worker has dropped the site."""
 
@@ -104,4 +124,4 @@ class Failed:
     reason: str
 
 
-Report = Ready | Started | Fed | View | Snapshot | Failed
+Report = Ready | Started | Fed | View | Snapshot | Answered | Failed

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 from lineloom_core.mapping.site_view import SiteView
 
@@ -24,6 +24,10 @@ class MapperFailedError(Exception):
 
 class RestoreFailedError(Exception):
     """A snapshot cannot be restored. The site has to be started from another, or from nothing."""
+
+
+class QuestionFailedError(Exception):
+    """The mapper could not answer a question. The map is as it was."""
 
 
 class WorkerDiedError(Exception):
@@ -88,6 +92,13 @@ class Engine(Protocol):
 
     async def snapshot(self, site: int) -> bytes:
         """Return the mapper's state after all that was fed. Raises MapperFailedError."""
+        ...
+
+    def ask(self, site: int, question: str, *arguments: object) -> Awaitable[Any]:
+        """Ask the site's mapper something that changes nothing (`mapper.QUESTIONS`).
+
+        Answered after all that was fed before. Raises QuestionFailedError.
+        """
         ...
 
     def stop_site(self, site: int) -> None:

@@ -13,8 +13,10 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
 from lineloom_service.engine.current_entry import RESTORING, CurrentEntry
-from lineloom_service.engine.mapper import Mapper, MapperFactory, apply, load
+from lineloom_service.engine.mapper import QUESTIONS, Mapper, MapperFactory, apply, load
 from lineloom_service.engine.messages import (
+    Answered,
+    Ask,
     Failed,
     Fed,
     Feed,
@@ -91,6 +93,8 @@ class Worker:
             self._start(order)
         elif isinstance(order, TakeSnapshot):
             self._snapshot(order)
+        elif isinstance(order, Ask):
+            self._answer(order)
         elif isinstance(order, StopSite):
             self._sites.pop(order.site, None)
 
@@ -148,7 +152,22 @@ class Worker:
             return
         self._connection.send(Snapshot(order.site, order.run, data))
 
-    def _hosted(self, order: Feed | TakeSnapshot) -> _Hosted | None:
+    def _answer(self, order: Ask) -> None:
+        hosted = self._hosted(order)
+        if hosted is None:
+            return
+        try:
+            if order.question not in QUESTIONS:
+                raise ValueError(f"no question {order.question!r}")
+            value = getattr(hosted.mapper, order.question)(*order.arguments)
+        except Exception as error:
+            # The map is as it was: the question is to blame, not the mapper.
+            _LOG.exception("site %d: %s was not answered", order.site, order.question)
+            self._connection.send(Answered(order.site, order.run, failure=describe(error)))
+            return
+        self._connection.send(Answered(order.site, order.run, value))
+
+    def _hosted(self, order: Feed | TakeSnapshot | Ask) -> _Hosted | None:
         """Return the site's mapper, unless the order is meant for one that has failed since."""
         hosted = self._sites.get(order.site)
         return hosted if hosted is not None and hosted.run == order.run else None

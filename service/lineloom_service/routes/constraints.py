@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 from lineloom import wire
 from lineloom.wire.constraint import ConstraintKind, ConstraintState
+from lineloom_core.io.evidence_drawing import draw_evidence
+from lineloom_core.io.svg import to_svg
+from lineloom_core.mapping.answers import Evidence, WhatIf
 from lineloom_core.mapping.site_view import ConstraintView, SiteView
 
-from lineloom_service.answers import answer
+from lineloom_service.answers import answer, unknown_format
+from lineloom_service.asking import ask
 from lineloom_service.convert import to_constraint
-from lineloom_service.dependencies import CurrentView, KnownSite
+from lineloom_service.convert_evidence import to_detail, to_what_if
+from lineloom_service.dependencies import CurrentView, KnownSite, ServiceDep
 from lineloom_service.errors import INVALID_PARAMETER, UNKNOWN_CONSTRAINT, ProblemError
+from lineloom_service.openapi import also_as
+from lineloom_service.service import Service
+from lineloom_service.store.records import ActionKind, SiteRecord
+
+_FOLLOW_S = 20.0
+"""How long an action's answer waits for the map."""
 
 router = APIRouter(tags=["graph"])
 
@@ -44,14 +56,89 @@ async def list_constraints(
     )
 
 
-@router.get("/v1/sites/{site}/constraints/{constraint}", response_model=wire.Constraint)
-async def get_constraint(site: KnownSite, constraint: str, view: CurrentView) -> Response:
-    """Return one constraint with its evidence."""
+@router.get(
+    "/v1/sites/{site}/constraints/{constraint}",
+    response_model=wire.ConstraintDetail,
+    responses=also_as("image/svg+xml"),
+)
+async def get_constraint(
+    site: KnownSite, constraint: str, view: CurrentView, service: ServiceDep, format: str = "json"
+) -> Response:
+    """Return one constraint with its evidence: `format` is json or svg."""
+    if format not in ("json", "svg"):
+        raise unknown_format(format, ("json", "svg"))
+    found = _find(site, view, constraint)
+    try:
+        evidence: Evidence | None = await ask(service, site, "explain", constraint)
+    except ProblemError:
+        if format == "svg":
+            raise
+        evidence = None  # what is known without the mapper is worth an answer
+    if format == "json":
+        return answer(to_detail(found, _robots(view), evidence))
+    if evidence is None:
+        raise _unknown(site, constraint)
+    drawing = await asyncio.to_thread(draw_evidence, found, evidence)
+    return Response(to_svg(drawing), media_type="image/svg+xml")
+
+
+@router.post("/v1/sites/{site}/constraints/{constraint}/retract", response_model=wire.Constraint)
+async def retract_constraint(
+    site: KnownSite, constraint: str, view: CurrentView, service: ServiceDep
+) -> Response:
+    """Make the map as if the constraint had never been accepted, for good.
+
+    Of a recognised meeting, all that says the same is refused with it. 200 with the constraint in
+    its new state; 202 with it as it still is, where the map takes longer to follow.
+    """
+    return await _act(service, site, view, constraint, "retract")
+
+
+@router.post("/v1/sites/{site}/constraints/{constraint}/restore", response_model=wire.Constraint)
+async def restore_constraint(
+    site: KnownSite, constraint: str, view: CurrentView, service: ServiceDep
+) -> Response:
+    """Take a retraction back, or overrule what the mapper has withdrawn."""
+    return await _act(service, site, view, constraint, "restore")
+
+
+@router.post("/v1/sites/{site}/constraints/{constraint}/what-if", response_model=wire.WhatIf)
+async def what_if(
+    site: KnownSite, constraint: str, view: CurrentView, service: ServiceDep
+) -> Response:
+    """Tell what retracting the constraint (restoring, where it is retracted) would do."""
+    _find(site, view, constraint)
+    found: WhatIf | None = await ask(service, site, "what_if", constraint)
+    if found is None:
+        raise _unknown(site, constraint)
+    return answer(to_what_if(found, view.version))
+
+
+async def _act(
+    service: Service, site: SiteRecord, view: SiteView, name: str, action: ActionKind
+) -> Response:
+    """Log an action, wait until the map has followed it, and return the constraint then."""
+    constraint = _find(site, view, name)
+    robots = _robots(view)
+    robot = robots.get(constraint.keyframe_b) or robots.get(constraint.keyframe_a, "")
+    position = await service.store.act(site.name, robot, action, name)
+    if position is None:
+        raise _unknown(site, name)
+    followed = await service.conductor.reached(site.id, position, _FOLLOW_S)
+    view = service.conductor.published(site.id).view
+    now = next((c for c in view.constraints if c.id == name), constraint)
+    return answer(to_constraint(now, _robots(view)), status=200 if followed else 202)
+
+
+def _find(site: SiteRecord, view: SiteView, name: str) -> ConstraintView:
     for found in view.constraints:
-        if found.id == constraint:
-            return answer(to_constraint(found, _robots(view)))
-    detail = f"no constraint {constraint!r} in site {site.name!r}"
-    raise ProblemError(UNKNOWN_CONSTRAINT, detail)
+        if found.id == name:
+            return found
+    raise _unknown(site, name)
+
+
+def _unknown(site: SiteRecord, name: str) -> ProblemError:
+    return ProblemError(UNKNOWN_CONSTRAINT, f"no constraint {name!r} in site {site.name!r}")
 
 
 def _after(view: SiteView, cursor: str | None) -> tuple[ConstraintView, ...]:

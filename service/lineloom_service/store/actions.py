@@ -15,6 +15,7 @@ from lineloom_service.store.database import notify
 from lineloom_service.store.ledger import SiteLedger
 from lineloom_service.store.reads import read_skips
 from lineloom_service.store.records import (
+    ActionKind,
     Appended,
     BacklogFullError,
     EventBatch,
@@ -95,6 +96,18 @@ def forget_robot(tx: Transaction, site_name: str, robot_name: str) -> bool:
     del site.robots[robot_name]
     site.changed.add(robot_name)
     return True
+
+
+def act(
+    tx: Transaction, site_name: str, robot_name: str, kind: ActionKind, constraint: str
+) -> int | None:
+    """Log what an operator does to a constraint of a robot; return the entry's position."""
+    site = tx.ledger.sites.get(site_name)
+    robot = None if site is None else site.robots.get(robot_name)
+    if site is None or robot is None:
+        return None
+    tx.add_control(site, robot, kind, constraint.encode())
+    return site.position
 
 
 def delete_site(tx: Transaction, site_name: str) -> int | None:

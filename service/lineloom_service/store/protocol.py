@@ -7,6 +7,7 @@ from typing import Literal, Protocol
 
 from lineloom_service.store.database import Claim
 from lineloom_service.store.records import (
+    ActionKind,
     Appended,
     EventBatch,
     LogEntry,
@@ -74,6 +75,13 @@ class Store(Protocol):
 
     async def forget_robot(self, site: str, robot: str) -> bool:
         """Log that a robot is to be forgotten. False where there is none of that name."""
+        ...
+
+    async def act(self, site: str, robot: str, kind: ActionKind, constraint: str) -> int | None:
+        """Log what an operator does to a constraint of this robot; return the entry's position.
+
+        None where there is no such robot.
+        """
         ...
 
     async def delete_site(self, site: str) -> int | None:

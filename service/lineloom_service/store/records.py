@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-EntryKind = Literal["scan", "mount", "forget"]
+EntryKind = Literal["scan", "mount", "forget", "retract", "restore"]
+ActionKind = Literal["retract", "restore"]
+"""What an operator can do to a constraint; the entry's body is its id."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,7 @@ from lineloom_service.store.database import Claim, Database, Work
 from lineloom_service.store.group_commit import GroupCommit
 from lineloom_service.store.protocol import NEWS, CommitListener, NewsListener
 from lineloom_service.store.records import (
+    ActionKind,
     Appended,
     EventBatch,
     LogEntry,
@@ -97,6 +98,14 @@ class SqlStore:
     async def forget_robot(self, site: str, robot: str) -> bool:
         """Log that a robot is to be forgotten."""
         return await self._write(partial(actions.forget_robot, site_name=site, robot_name=robot))
+
+    async def act(self, site: str, robot: str, kind: ActionKind, constraint: str) -> int | None:
+        """Log what an operator does to a constraint."""
+        return await self._write(
+            partial(
+                actions.act, site_name=site, robot_name=robot, kind=kind, constraint=constraint
+            )
+        )
 
     async def delete_site(self, site: str) -> int | None:
         """Forget a site; its rows are removed in the background."""

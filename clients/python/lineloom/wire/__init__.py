@@ -6,7 +6,7 @@ not know, so that an older client understands a newer service.
 """
 
 from lineloom.wire.base import ID_PATTERN, MAX_BATCH, MAX_BEAMS, MAX_BODY_BYTES, Answer, Request
-from lineloom.wire.constraint import Constraint, ConstraintPage
+from lineloom.wire.constraint import Constraint, ConstraintPage, StateChange
 from lineloom.wire.event import (
     AnyEvent,
     ComponentMergedEvent,
@@ -17,6 +17,15 @@ from lineloom.wire.event import (
     ResetEvent,
     RobotEvent,
     ScanEvent,
+)
+from lineloom.wire.evidence import (
+    CheckLimit,
+    ComponentRobots,
+    ConstraintDetail,
+    MatchedLines,
+    RobotMove,
+    RunnerUp,
+    WhatIf,
 )
 from lineloom.wire.graph import Graph, GraphEdge, GraphNode, GraphSummary
 from lineloom.wire.ingest import IngestAnswer, RejectedScan, ScanBatch
@@ -42,10 +51,13 @@ __all__ = [
     "Alternative",
     "Answer",
     "AnyEvent",
+    "CheckLimit",
     "Component",
     "ComponentMergedEvent",
+    "ComponentRobots",
     "ComponentSplitEvent",
     "Constraint",
+    "ConstraintDetail",
     "ConstraintEvent",
     "ConstraintPage",
     "Event",
@@ -64,6 +76,7 @@ __all__ = [
     "MatchAnswer",
     "MatchRequest",
     "MatchScan",
+    "MatchedLines",
     "MountSettings",
     "Odometry",
     "PoseAnswer",
@@ -75,17 +88,21 @@ __all__ = [
     "Robot",
     "RobotEvent",
     "RobotList",
+    "RobotMove",
     "RobotSettings",
+    "RunnerUp",
     "Scan",
     "ScanBatch",
     "ScanCounts",
     "ScanEvent",
     "Site",
     "SiteList",
+    "StateChange",
     "Trajectory",
     "TrajectoryPose",
     "Transform",
     "UncertainPose",
+    "WhatIf",
     "pack_json",
     "pack_msgpack",
 ]

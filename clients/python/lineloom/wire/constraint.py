@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
+from pydantic import Field
+
 from lineloom.wire.base import Answer, Covariance
 from lineloom.wire.pose import PoseAnswer
 
@@ -11,12 +13,21 @@ ConstraintKind = Literal["sequential", "loop", "rendezvous"]
 ConstraintState = Literal["candidate", "accepted", "rejected", "retracted"]
 
 
+class StateChange(Answer):
+    """A move of a constraint: at which version it came into the state, and why."""
+
+    version: int
+    state: ConstraintState
+    reason: str
+
+
 class Constraint(Answer):
     """Two keyframes and how they lie to each other.
 
     T_a_b: pose of keyframe b in the frame of keyframe a. information: 3x3, x, y, theta in the
     axes of b. checks: each check's figure by name. residual: whitened norm in the graph now,
-    null where the constraint is not in the graph. reason: why it is in this state.
+    null where the constraint is not in the graph. reason: why it is in this state. history: how
+    it came there.
     """
 
     id: str
@@ -32,6 +43,7 @@ class Constraint(Answer):
     checks: dict[str, float | None]
     consistency_set: list[str]
     residual: float | None = None
+    history: list[StateChange] = Field(default_factory=list)
 
 
 class ConstraintPage(Answer):

@@ -1,0 +1,92 @@
+"""What the mapper answers to questions about its map; plain data, so that anyone can read it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Action = Literal["retract", "restore"]
+
+
+@dataclass(frozen=True, slots=True)
+class RobotMove:
+    """A robot's latest pose before and after.
+
+    moved [m], turned [rad]: in the frame of the component; None where the robot would change the
+    component, as frames of two components cannot be compared, or has no pose.
+    """
+
+    robot: str
+    component_before: str | None
+    component_after: str | None
+    moved: float | None
+    turned: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class WhatIf:
+    """What the action would do: components with their robots before and after, and every robot."""
+
+    action: Action
+    constraint: str
+    components_before: dict[str, tuple[str, ...]]
+    components_after: dict[str, tuple[str, ...]]
+    robots: tuple[RobotMove, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """What a check's figure is held to."""
+
+    at_least: float | None
+    at_most: float | None
+    holds: bool
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class MatchedLines:
+    """Two lines taken for one wall: x1, y1, x2, y2 in the frame of keyframe a.
+
+    overlap [m], distance [m] and angle [rad] as they lie there.
+    """
+
+    reference: tuple[float, float, float, float]
+    current: tuple[float, float, float, float]
+    overlap: float
+    distance: float
+    angle: float
+
+
+@dataclass(frozen=True, slots=True)
+class RunnerUp:
+    """The best other way to lay the two on each other: pose of keyframe b seen from keyframe a."""
+
+    x: float
+    y: float
+    theta: float
+    evidence: float
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What speaks for a constraint and against it; all coordinates in the frame of keyframe a.
+
+    limits: by check. votes: metres of line that voted for the hypothesis before it was refined.
+    margin: lead of the hypothesis over the runner-up as a share of its evidence. reference,
+    current (n, 4): all lines of both. conflicts (m, 2): points of one in free space of the other.
+    votes, runner_up and margin are None where no pose-free match was made.
+    """
+
+    constraint: str
+    limits: dict[str, Limit]
+    matched: tuple[MatchedLines, ...]
+    reference: NDArray[np.float64]
+    current: NDArray[np.float64]
+    conflicts: NDArray[np.float64]
+    votes: float | None = None
+    runner_up: RunnerUp | None = None
+    margin: float | None = None
+    places: dict[str, int] = field(default_factory=dict)

@@ -1,0 +1,69 @@
+"""Between the core's answers about constraints and the contract's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from lineloom import wire
+from lineloom_core.mapping.answers import Evidence, WhatIf
+from lineloom_core.mapping.site_view import ConstraintView
+
+from lineloom_service.convert import to_constraint
+
+
+def to_detail(
+    constraint: ConstraintView, robots: Mapping[int, str], evidence: Evidence | None
+) -> wire.ConstraintDetail:
+    """Return a constraint with its evidence, None where the mapper could not be asked."""
+    basis = to_constraint(constraint, robots).model_dump()
+    if evidence is None:
+        return wire.ConstraintDetail.model_validate(basis)
+    best = evidence.runner_up
+    return wire.ConstraintDetail(
+        **basis,
+        limits={
+            name: wire.CheckLimit(at_least=x.at_least, at_most=x.at_most, holds=x.holds)
+            for name, x in evidence.limits.items()
+        },
+        matched=[
+            wire.MatchedLines(
+                reference=list(m.reference),
+                current=list(m.current),
+                overlap=m.overlap,
+                distance=m.distance,
+                angle=m.angle,
+            )
+            for m in evidence.matched
+        ],
+        conflicts=evidence.conflicts.tolist(),
+        votes=evidence.votes,
+        runner_up=None
+        if best is None
+        else wire.RunnerUp(x=best.x, y=best.y, theta=best.theta, evidence=best.evidence),
+        margin=evidence.margin,
+    )
+
+
+def to_what_if(found: WhatIf, version: int) -> wire.WhatIf:
+    """Return what an action would do."""
+    return wire.WhatIf(
+        constraint=found.constraint,
+        action=found.action,
+        version=version,
+        components_before=_components(found.components_before),
+        components_after=_components(found.components_after),
+        robots=[
+            wire.RobotMove(
+                robot=move.robot,
+                component_before=move.component_before,
+                component_after=move.component_after,
+                moved_m=move.moved,
+                turned_rad=move.turned,
+            )
+            for move in found.robots
+        ],
+    )
+
+
+def _components(members: Mapping[str, tuple[str, ...]]) -> list[wire.ComponentRobots]:
+    return [wire.ComponentRobots(id=name, robots=list(robots)) for name, robots in members.items()]
