@@ -102,9 +102,7 @@ class SqlStore:
     async def act(self, site: str, robot: str, kind: ActionKind, constraint: str) -> int | None:
         """Log what an operator does to a constraint."""
         return await self._write(
-            partial(
-                actions.act, site_name=site, robot_name=robot, kind=kind, constraint=constraint
-            )
+            partial(actions.act, site_name=site, robot_name=robot, kind=kind, constraint=constraint)
         )
 
     async def delete_site(self, site: str) -> int | None:
