@@ -148,8 +148,12 @@ def _legend(
 def _footer(view: SiteView, scale: float | None, width: float, top: float) -> Iterator[Mark]:
     note = f"version {view.version} · wider and darker = seen in more keyframes"
     yield Label(MARGIN, top + 34.0, note, 0.85 * _FONT, MUTED)
-    if scale is None:
-        return
+    if scale is not None:
+        yield from scale_bar(scale, width, top)
+
+
+def scale_bar(scale: float, width: float, top: float) -> Iterator[Mark]:
+    """Yield a bar of a round number of metres at the right of a page `width` wide [px]."""
     metres = _round_length(0.16 * width / scale)
     right, base = width - MARGIN, top + 28.0
     left = right - metres * scale

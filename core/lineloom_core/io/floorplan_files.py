@@ -1,0 +1,135 @@
+"""Floor plans from files: GeoJSON, DXF, or text with `x1, y1, x2, y2` on each line."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+from collections.abc import Iterable, Iterator
+from typing import Any, Literal
+
+from ezdxf import units
+from ezdxf.disassemble import recursive_decompose, to_primitives
+from ezdxf.enums import InsertUnits
+from ezdxf.filemanagement import read as read_dxf
+from ezdxf.lldxf.const import DXFError
+
+from lineloom_core.floorplan.plan import MOST_LINES, FloorPlan, FloorPlanError
+
+PlanFormat = Literal["geojson", "dxf", "text"]
+
+Segment = tuple[float, float, float, float]
+
+_CURVE_STEP_M = 0.05
+"""How far a chord may lie from the curve that it stands for."""
+
+
+def read_plan(content: bytes, format: PlanFormat) -> FloorPlan:
+    """Return the plan in metres. Raises FloorPlanError saying what is wrong, and where."""
+    try:
+        # Names in drawings of old have an encoding of their own; lines need none.
+        text = content.decode("utf-8-sig", "replace" if format == "dxf" else "strict")
+    except UnicodeDecodeError:
+        raise FloorPlanError("is not UTF-8 text") from None
+    readers = {"geojson": _geojson, "dxf": _dxf, "text": _text}
+    segments = []
+    for segment in readers[format](text):
+        segments.append(segment)
+        if len(segments) > MOST_LINES:
+            raise FloorPlanError(f"holds more than {MOST_LINES} lines")
+    return FloorPlan.of(segments)
+
+
+def _text(text: str) -> Iterator[Segment]:
+    for number, row in enumerate(text.splitlines(), start=1):
+        content = row.split("#", 1)[0].strip()
+        if not content:
+            continue
+        try:
+            x1, y1, x2, y2 = (float(f) for f in content.replace(",", " ").split())
+        except ValueError:
+            raise FloorPlanError(
+                f"line {number}: expected four numbers 'x1, y1, x2, y2': {row.strip()[:60]!r}"
+            ) from None
+        yield _finite((x1, y1, x2, y2), f"line {number}")
+
+
+def _geojson(text: str) -> Iterator[Segment]:
+    try:
+        document = json.loads(text)
+    except ValueError as error:
+        raise FloorPlanError(f"is not JSON: {error}") from None
+    if not isinstance(document, dict):
+        raise FloorPlanError("is no GeoJSON object")
+    if document.get("type") == "FeatureCollection":
+        features = document.get("features")
+        if not isinstance(features, list):
+            raise FloorPlanError("features: must be a list")
+        for i, feature in enumerate(features):
+            geometry = feature.get("geometry") if isinstance(feature, dict) else None
+            yield from _geometry(geometry, f"features/{i}/geometry")
+    elif document.get("type") == "Feature":
+        yield from _geometry(document.get("geometry"), "geometry")
+    else:
+        yield from _geometry(document, "geometry")
+
+
+def _geometry(geometry: Any, where: str) -> Iterator[Segment]:
+    """Yield what is drawn of lines and outlines; points mark no wall."""
+    if geometry is None:
+        return
+    if not isinstance(geometry, dict):
+        raise FloorPlanError(f"{where}: must be an object")
+    kind, coordinates = geometry.get("type"), geometry.get("coordinates")
+    depth = {"LineString": 1, "MultiLineString": 2, "Polygon": 2, "MultiPolygon": 3}
+    if kind == "GeometryCollection":
+        for i, part in enumerate(geometry.get("geometries") or []):
+            yield from _geometry(part, f"{where}/geometries/{i}")
+    elif kind in depth:
+        yield from _rings(coordinates, depth[kind], f"{where}/coordinates")
+    elif kind not in ("Point", "MultiPoint"):
+        raise FloorPlanError(f"{where}: {kind!r} is no type of geometry")
+
+
+def _rings(coordinates: Any, depth: int, where: str) -> Iterator[Segment]:
+    if not isinstance(coordinates, list):
+        raise FloorPlanError(f"{where}: must be a list")
+    if depth > 1:
+        for i, part in enumerate(coordinates):
+            yield from _rings(part, depth - 1, f"{where}/{i}")
+        return
+    try:
+        points = [(float(p[0]), float(p[1])) for p in coordinates]
+    except (TypeError, ValueError, IndexError, KeyError):
+        raise FloorPlanError(f"{where}: positions must be pairs of numbers") from None
+    yield from _chain(points, where)
+
+
+def _dxf(text: str) -> Iterator[Segment]:
+    """Yield lines, polylines and curves of the model space, blocks taken apart, in metres."""
+    try:
+        document = read_dxf(io.StringIO(text))
+    except (DXFError, ValueError, OSError) as error:
+        raise FloorPlanError(f"is no DXF that can be read: {error}") from None
+    scale = 1.0
+    if document.units != InsertUnits.Unitless:
+        scale = float(units.conversion_factor(InsertUnits(document.units), InsertUnits.Meters))
+    kinds = {"LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE"}
+    entities = (e for e in recursive_decompose(document.modelspace()) if e.dxftype() in kinds)
+    for primitive in to_primitives(entities, max_flattening_distance=_CURVE_STEP_M / scale):
+        points = [(v.x * scale, v.y * scale) for v in primitive.vertices()]
+        yield from _chain(points, f"entity {primitive.entity}")
+
+
+def _chain(points: Iterable[tuple[float, float]], where: str) -> Iterator[Segment]:
+    before: tuple[float, float] | None = None
+    for point in points:
+        if before is not None:
+            yield _finite((*before, *point), where)
+        before = point
+
+
+def _finite(segment: Segment, where: str) -> Segment:
+    if not all(math.isfinite(v) for v in segment):
+        raise FloorPlanError(f"{where}: coordinates must be finite numbers")
+    return segment

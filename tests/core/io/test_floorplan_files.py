@@ -1,0 +1,97 @@
+"""Floor plans: the same building from each format, and what is said of broken ones."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from ezdxf import units
+from ezdxf.filemanagement import new
+from lineloom_core.floorplan.plan import FloorPlan, FloorPlanError
+from lineloom_core.io.floorplan_files import PlanFormat, read_plan
+
+ROOM = [[0.0, 0.0, 5.0, 0.0], [5.0, 0.0, 5.0, 3.0], [5.0, 3.0, 0.0, 3.0], [0.0, 3.0, 0.0, 0.0]]
+RING = [[0, 0], [5, 0], [5, 3], [0, 3], [0, 0]]
+
+
+def geojson(geometry: dict[str, Any]) -> bytes:
+    feature = {"type": "Feature", "properties": {}, "geometry": geometry}
+    return json.dumps({"type": "FeatureCollection", "features": [feature]}).encode()
+
+
+def dxf(unit: int = units.M, size: float = 1.0) -> bytes:
+    document = new("R2010")
+    document.units = unit
+    block = document.blocks.new("WALLS")
+    block.add_lwpolyline([(x * size, y * size) for x, y in RING[:3]])
+    space = document.modelspace()
+    space.add_blockref("WALLS", (0, 0))
+    for x1, y1, x2, y2 in ROOM[2:]:
+        space.add_line((x1 * size, y1 * size), (x2 * size, y2 * size))
+    space.add_text("Kitchen")
+    target = io.StringIO()
+    document.write(target)
+    return target.getvalue().encode()
+
+
+def same(plan: FloorPlan) -> bool:
+    lines = plan.lines[np.lexsort(plan.lines.T)]
+    room = np.array(ROOM)
+    return lines.shape == (4, 4) and np.allclose(lines, room[np.lexsort(room.T)], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("content", "format"),
+    [
+        (b"# a room\n0,0, 5,0\n5 0 5 3\n5,3,0,3\n\n0,3,0,0\n1,1,1,1\n", "text"),
+        (geojson({"type": "LineString", "coordinates": RING}), "geojson"),
+        (geojson({"type": "Polygon", "coordinates": [RING]}), "geojson"),
+        (json.dumps({"type": "MultiLineString", "coordinates": [RING]}).encode(), "geojson"),
+        (dxf(), "dxf"),
+        (dxf(units.MM, 1000.0), "dxf"),
+        (dxf(units.IN, 1.0 / 0.0254), "dxf"),
+        (dxf(0), "dxf"),
+    ],
+)
+def test_the_same_room_from_every_format(content: bytes, format: PlanFormat) -> None:
+    assert same(read_plan(content, format))
+
+
+def test_curves_become_chords_that_stay_near() -> None:
+    document = new("R2010")
+    document.units = units.M
+    document.modelspace().add_arc((1.0, 2.0), 4.0, 0.0, 90.0)
+    target = io.StringIO()
+    document.write(target)
+    lines = read_plan(target.getvalue().encode(), "dxf").lines
+    middle = 0.5 * (lines[:, :2] + lines[:, 2:]) - [1.0, 2.0]
+    assert np.abs(np.hypot(*middle.T) - 4.0).max() <= 0.05
+    assert np.hypot(*(lines[:, :2] - lines[:, 2:]).T).sum() == pytest.approx(2.0 * math.pi, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("content", "format", "what"),
+    [
+        (b"0,0,1\n", "text", "line 1: expected four numbers"),
+        (b"0,0,1,1\n0,0,x,1\n", "text", "line 2"),
+        (b"0,0,nan,1\n", "text", "line 1: coordinates must be finite"),
+        (b"", "text", "no line"),
+        (b"\xff\xfe", "text", "not UTF-8"),
+        (b"{", "geojson", "not JSON"),
+        (b"[]", "geojson", "no GeoJSON object"),
+        (b'{"type": "FeatureCollection"}', "geojson", "features: must be a list"),
+        (geojson({"type": "Blob"}), "geojson", "features/0/geometry: 'Blob' is no type"),
+        (geojson({"type": "LineString", "coordinates": [[0], [1]]}), "geojson", "pairs of numbers"),
+        (geojson({"type": "LineString", "coordinates": 7}), "geojson", "must be a list"),
+        (geojson({"type": "Point", "coordinates": [0, 0]}), "geojson", "no line"),
+        (b"0\nSECTION\n", "dxf", "no DXF"),
+        (b"hello", "dxf", "no DXF"),
+    ],
+)
+def test_broken_plans_are_told_where(content: bytes, format: PlanFormat, what: str) -> None:
+    with pytest.raises(FloorPlanError, match=what):
+        read_plan(content, format)
