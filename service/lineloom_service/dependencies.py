@@ -12,6 +12,7 @@ from lineloom.wire import ID_PATTERN
 from lineloom_core.mapping.site_view import SiteView
 
 from lineloom_service.errors import UNKNOWN_ROBOT, UNKNOWN_SITE, ProblemError
+from lineloom_service.security.scopes import scope_of
 from lineloom_service.service import Service
 from lineloom_service.store.records import RobotRecord, SiteRecord
 
@@ -28,6 +29,18 @@ async def get_service(request: Request) -> Service:
 
 
 ServiceDep = Annotated[Service, Depends(get_service)]
+
+
+async def admitted(request: Request, service: ServiceDep) -> None:
+    """Let pass whoever has a token with the route's scope, or answer 401 or 403."""
+    path: str = request.scope["route"].path
+    names = request.path_params
+    request.state.token_id = await service.guard.admit(
+        request.headers.get("authorization"),
+        scope_of(request.method, path),
+        names.get("site"),
+        names.get("robot"),
+    )
 
 
 async def known_site(name: SiteName, service: ServiceDep) -> SiteRecord:

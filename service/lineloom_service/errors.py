@@ -30,6 +30,8 @@ class Kind:
 
 
 MALFORMED_BODY = Kind("malformed-body", 400, "The body cannot be read")
+UNAUTHORIZED = Kind("unauthorized", 401, "A token is needed")
+FORBIDDEN = Kind("forbidden", 403, "The token is not good for this")
 NOT_FOUND = Kind("not-found", 404, "There is nothing at this address")
 UNKNOWN_SITE = Kind("unknown-site", 404, "There is no such site")
 UNKNOWN_ROBOT = Kind("unknown-robot", 404, "There is no such robot")

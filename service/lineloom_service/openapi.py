@@ -9,6 +9,8 @@ from fastapi.openapi.utils import get_openapi
 from lineloom import wire
 from pydantic.json_schema import models_json_schema
 
+from lineloom_service.security.scopes import scope_of
+
 _SCHEMAS = "#/components/schemas/"
 _MODELS = (
     wire.Scan,
@@ -18,6 +20,7 @@ _MODELS = (
     wire.Problem,
     wire.Event,
 )
+_OPEN = ("/healthz", "/readyz")
 _DESCRIPTION = """\
 Scans of 2D lidars in, one merged line map out, no poses needed.
 
@@ -76,7 +79,26 @@ def install(app: FastAPI) -> None:
             )
             schemas = document.setdefault("components", {}).setdefault("schemas", {})
             schemas.update(extra["$defs"])
+            _describe_tokens(document)
             app.openapi_schema = document
         return app.openapi_schema
 
     app.openapi = describe  # type: ignore[method-assign]  # FastAPI's documented way
+
+
+def _describe_tokens(document: dict[str, Any]) -> None:
+    """Say which scope each call takes. Optional: where there are no tokens, none is needed."""
+    document["components"]["securitySchemes"] = {
+        "token": {
+            "type": "http",
+            "scheme": "bearer",
+            "description": "From `lineloom token create`.",
+        }
+    }
+    for path, methods in document["paths"].items():
+        for method, operation in methods.items():
+            if path in _OPEN:
+                continue
+            operation["security"] = [{"token": []}, {}]
+            told = f"Token scope: `{scope_of(method.upper(), path)}`."
+            operation["description"] = f"{operation.get('description', '')}\n\n{told}".lstrip()

@@ -19,6 +19,12 @@ from lineloom_service.errors import (
     ProblemError,
 )
 
+_MOST_MEMBERS = 64
+"""Each costs a copy of what follows it."""
+
+_MOST_ITEMS = 100_000
+"""In one msgpack array or map: a header alone makes the decoder set so much memory aside."""
+
 _GZIP = 31  # zlib's window bits for "a gzip header and trailer, nothing else"
 
 
@@ -80,20 +86,25 @@ async def _read(request: Request, limit: int) -> bytes:
 
 
 def _gunzip(data: bytes, limit: int) -> bytes:
+    """Decompress. A bomb costs no more than a full body: neither one large member nor many."""
     plain = bytearray()
-    while data:
+    rest = data
+    for _ in range(_MOST_MEMBERS):
         stream = zlib.decompressobj(_GZIP)
         try:
             # One byte more than allowed tells a full body from one that is too large.
-            plain += stream.decompress(data, limit + 1 - len(plain))
+            plain += stream.decompress(rest, limit + 1 - len(plain))
         except zlib.error as error:
             raise ProblemError(MALFORMED_BODY, f"the body is not gzip: {error}") from error
         if len(plain) > limit:
             raise _too_large(limit)
         if not stream.eof:
             raise ProblemError(MALFORMED_BODY, "the gzip stream ends too early")
-        data = stream.unused_data
-    return bytes(plain)
+        rest = stream.unused_data
+        if not rest:
+            return bytes(plain)
+    detail = f"a gzip stream may have {_MOST_MEMBERS} members; compress the body in one go"
+    raise ProblemError(TOO_LARGE, detail)
 
 
 def _decode_json(data: bytes) -> Any:
@@ -106,7 +117,7 @@ def _decode_json(data: bytes) -> Any:
 
 def _decode_msgpack(data: bytes) -> Any:
     try:
-        return msgpack.unpackb(data)
+        return msgpack.unpackb(data, max_array_len=_MOST_ITEMS, max_map_len=_MOST_ITEMS)
     except ValueError as error:
         reason = str(error) or type(error).__name__
         raise ProblemError(MALFORMED_BODY, f"the body is not msgpack: {reason}") from error

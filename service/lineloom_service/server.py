@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-import ipaddress
 import logging
+import socket
 import sys
 
 import uvicorn
 import uvloop
 
 from lineloom_service.app import create_app
+from lineloom_service.security.guard import UnprotectedError
 from lineloom_service.service import Service
 from lineloom_service.settings import Settings
 from lineloom_service.store.records import StoreError
@@ -28,15 +29,10 @@ def run(settings: Settings) -> None:
     # Every request to stderr costs more than the request.
     for noisy in ("alembic", "uvicorn.access"):
         logging.getLogger(noisy).setLevel(logging.WARNING)
-    if not settings.open and not _is_loopback(settings.host):
-        sys.exit(
-            f"lineloom: {settings.host} is reachable from outside and nothing protects the "
-            "service; listen on 127.0.0.1, or say that this is meant (LINELOOM_OPEN=true)"
-        )
     try:
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
             runner.run(_serve(settings))
-    except StoreError as error:
+    except (StoreError, UnprotectedError) as error:
         sys.exit(f"lineloom: {error}")
     except KeyboardInterrupt:
         # uvicorn raises the signal again once it has stopped in good order.
@@ -55,16 +51,19 @@ async def _serve(settings: Settings) -> None:
             proxy_headers=False,
             access_log=settings.log_level == "debug",
             timeout_graceful_shutdown=_SHUTDOWN_S,
+            server_header=False,
+            ssl_certfile=settings.ssl_certfile,
+            ssl_keyfile=settings.ssl_keyfile,
         )
-        await uvicorn.Server(config).serve()
+        listening = config.bind_socket()
+        _drop_the_deaf(listening, settings.slow_reader_s)
+        await uvicorn.Server(config).serve(sockets=[listening])
     finally:
         await service.stop()
 
 
-def _is_loopback(host: str) -> bool:
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
+def _drop_the_deaf(listening: socket.socket, patience_s: float) -> None:
+    """Have the kernel end connections whose other side takes nothing any more."""
+    if hasattr(socket, "TCP_USER_TIMEOUT"):
+        patience_ms = round(1000 * patience_s)
+        listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, patience_ms)

@@ -13,6 +13,7 @@ from lineloom_service.engine.protocol import Engine
 from lineloom_service.events.hub import EventHub
 from lineloom_service.events.recorder import EventRecorder
 from lineloom_service.matching import PairMatcher
+from lineloom_service.security.guard import Guard
 from lineloom_service.settings import Settings
 from lineloom_service.store.choice import database_at
 from lineloom_service.store.protocol import Store
@@ -43,11 +44,20 @@ class Service:
         )
         self.conductor = Conductor(self.store, self.engine, settings, recorder)
         self.matcher = PairMatcher()
+        self.guard = Guard(self.store.tokens)
         self._warming: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
-        """Open the store and begin to map. Raises StoreError. Readiness comes later."""
+        """Open the store and begin to map. Readiness comes later.
+
+        Raises StoreError, and UnprotectedError where others could come in.
+        """
         await self.store.open()
+        try:
+            await self.guard.start(self.settings.host, open=self.settings.open)
+        except BaseException:
+            await self.store.close()
+            raise
         await self.conductor.start()
         self._warming = asyncio.create_task(self.matcher.warm_up())
         self._warming.add_done_callback(_report_failure)
@@ -57,6 +67,7 @@ class Service:
         if self._warming is not None:
             self._warming.cancel()
         self.matcher.close()
+        await self.guard.stop()
         await self.conductor.stop()
         await self.store.close()
 

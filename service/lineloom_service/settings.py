@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Annotated, Self
 
 from lineloom.wire import MAX_BATCH, MAX_BODY_BYTES
-from pydantic import Field
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic import Field, field_validator, model_validator
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 
 def _default_workers() -> int:
@@ -30,6 +31,11 @@ class Settings(BaseSettings):
     port: int = Field(default=8765, ge=0, le=65535)
     open: bool = Field(
         default=False, description="Listen beyond loopback although no tokens protect the service."
+    )
+    ssl_certfile: Path | None = Field(default=None, description="TLS certificate chain, PEM.")
+    ssl_keyfile: Path | None = Field(default=None, description="Its private key, PEM.")
+    allow_origins: Annotated[tuple[str, ...], NoDecode] = Field(
+        default=(), description="Origins whose pages may call the service, comma-separated."
     )
     log_level: str = "info"
 
@@ -73,6 +79,19 @@ class Settings(BaseSettings):
     slow_reader_s: float = Field(
         default=20.0, gt=0.0, description="A client that reads nothing for this long is dropped."
     )
+
+    @field_validator("allow_origins", mode="before")
+    @classmethod
+    def _split(cls, value: object) -> object:
+        if isinstance(value, str):
+            return tuple(part.strip() for part in value.split(",") if part.strip())
+        return value
+
+    @model_validator(mode="after")
+    def _check_tls(self) -> Self:
+        if (self.ssl_certfile is None) != (self.ssl_keyfile is None):
+            raise ValueError("ssl_certfile and ssl_keyfile go together")
+        return self
 
     @property
     def database_path(self) -> Path:

@@ -68,6 +68,7 @@ async def test_a_failing_storage_is_503_and_nothing_is_taken(
 async def test_types_are_stable() -> None:
     assert sorted(kind.slug for kind in KINDS) == [
         "backlog-full",
+        "forbidden",
         "http",
         "internal",
         "invalid-body",
@@ -80,6 +81,7 @@ async def test_types_are_stable() -> None:
         "storage",
         "too-large",
         "too-many-streams",
+        "unauthorized",
         "unknown-component",
         "unknown-constraint",
         "unknown-format",

@@ -4,6 +4,7 @@ from fastapi import APIRouter
 
 from lineloom_service.routes import (
     constraints,
+    docs,
     events,
     graph,
     ingest,
@@ -27,6 +28,8 @@ ROUTERS: tuple[APIRouter, ...] = (
     constraints.router,
     events.router,
     match.router,
-    status.router,
 )
-"""All routers, in the order of the documentation."""
+"""What takes a token, where there are tokens; in the order of the documentation."""
+
+OPEN_ROUTERS: tuple[APIRouter, ...] = (status.router, docs.router)
+"""What never does: it says nothing about any site."""

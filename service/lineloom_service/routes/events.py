@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import AsyncGenerator
 from typing import Annotated
 
-from fastapi import APIRouter, Header, Query, Response
+from fastapi import APIRouter, Header, Query, Request, Response
 
 from lineloom_service.dependencies import CurrentView, KnownSite, ServiceDep
 from lineloom_service.errors import TOO_MANY_STREAMS, ProblemError
@@ -20,6 +20,7 @@ router = APIRouter(tags=["events"])
 
 @router.get("/v1/sites/{site}/events", response_class=Response, responses=events_of("Event"))
 async def get_events(
+    request: Request,
     site: KnownSite,
     view: CurrentView,
     service: ServiceDep,
@@ -45,17 +46,23 @@ async def get_events(
     feed = EventFeed(service.store, service.events, site.id, poll_s=None)
     first = await feed.start(last_event_id, view.version)
     following = feed.messages(settings.heartbeat_s, follow=follow)
-    return EventStream(_counted(service, first, following), settings.slow_reader_s)
+    messages = _counted(service, request.state.token_id, first, following)
+    return EventStream(messages, settings.slow_reader_s)
 
 
 async def _counted(
-    service: Service, first: Message, following: AsyncGenerator[Message | None]
+    service: Service,
+    token_id: str | None,
+    first: Message,
+    following: AsyncGenerator[Message | None],
 ) -> AsyncGenerator[Message | None]:
     service.event_streams += 1
     try:
         yield first
         async with contextlib.aclosing(following):
             async for message in following:
+                if not service.guard.still_good(token_id):
+                    return
                 yield message
     finally:
         service.event_streams -= 1

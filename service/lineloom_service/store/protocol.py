@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Literal, Protocol
 
+from lineloom_service.security.token import TokenRecord
 from lineloom_service.store.database import Claim
 from lineloom_service.store.records import (
     ActionKind,
@@ -149,4 +150,8 @@ class Store(Protocol):
 
         Raises ClaimedError where another is and `wait` is false.
         """
+        ...
+
+    async def tokens(self) -> list[TokenRecord]:
+        """Return all bearer tokens, revoked ones included."""
         ...

@@ -11,6 +11,8 @@ from typing import TypeVar
 
 from sqlalchemy.exc import SQLAlchemyError
 
+from lineloom_service.security.token import TokenRecord
+from lineloom_service.security.token_book import read_tokens
 from lineloom_service.store import actions, reads
 from lineloom_service.store.database import Claim, Database, Work
 from lineloom_service.store.group_commit import GroupCommit
@@ -185,6 +187,10 @@ class SqlStore:
         claim = await self._database.claim(wait=wait)
         self._term = await self._write(actions.begin_term)
         return claim
+
+    async def tokens(self) -> list[TokenRecord]:
+        """Return all bearer tokens."""
+        return await self._read(read_tokens)
 
     def _on_commit(self, record: SiteRecord) -> None:
         former = self._records.get(record.name)

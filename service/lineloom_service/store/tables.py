@@ -6,6 +6,7 @@ from sqlalchemy import (
     BigInteger,
     Boolean,
     Column,
+    Double,
     ForeignKey,
     Index,
     Integer,
@@ -145,4 +146,18 @@ views = Table(
     Column("site_id", ForeignKey("sites.id"), primary_key=True, autoincrement=False),
     Column("position", BigInteger, nullable=False),
     Column("data", LargeBinary, nullable=False),
+)
+
+# Of a token's secret there is a digest only.
+tokens = Table(
+    "tokens",
+    metadata,
+    Column("id", String(12), primary_key=True),
+    Column("digest", String(64), nullable=False),
+    Column("scopes", String(64), nullable=False),
+    Column("site", String(64)),
+    Column("robot", String(64)),
+    Column("note", String(200), nullable=False),
+    Column("created", Double, nullable=False),
+    Column("revoked", Double),
 )

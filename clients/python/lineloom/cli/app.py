@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from lineloom.cli import bench, demo, experiment, match, replay, serve, simulate, status
+from lineloom.cli import bench, demo, experiment, match, replay, serve, simulate, status, token
 from lineloom.cli import map as map_command
 from lineloom.cli.console import note
 from lineloom.cli.failure import EXIT_CODES, explained
@@ -78,6 +78,7 @@ app.command("match")(match.match)
 app.command("status")(status.status)
 app.command("experiment")(experiment.experiment)
 app.add_typer(bench.app, name="bench")
+app.add_typer(token.app, name="token")
 
 
 def main() -> None:

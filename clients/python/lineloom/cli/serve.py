@@ -34,7 +34,13 @@ def serve(
     ] = None,
     open_: Annotated[
         bool | None,
-        typer.Option("--open", help="Listen beyond this machine although nothing protects it."),
+        typer.Option("--open", help="Listen beyond this machine although there are no tokens."),
+    ] = None,
+    ssl_certfile: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="TLS certificate chain, PEM.")
+    ] = None,
+    ssl_keyfile: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The certificate's private key, PEM.")
     ] = None,
     log_level: Annotated[
         str | None,
@@ -66,6 +72,8 @@ def serve(
         "database_url": database_url,
         "workers": workers,
         "open": open_,
+        "ssl_certfile": ssl_certfile,
+        "ssl_keyfile": ssl_keyfile,
         "log_level": log_level,
     }
     try:
