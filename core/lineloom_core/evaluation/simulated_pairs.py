@@ -51,8 +51,8 @@ def simulated_pairs(
             continue
         count -= 1
         yield SimulatedPair(
-            lidar.scan(world, here, rng, disks=_bystanders(here, rng, people)),
-            lidar.scan(world, there, rng, disks=_bystanders(there, rng, people)),
+            lidar.scan(world, here, rng, disks=bystanders(here, rng, people)),
+            lidar.scan(world, there, rng, disks=bystanders(there, rng, people)),
             here.between(there),
             negative,
         )
@@ -74,7 +74,7 @@ def _partner(
     return None
 
 
-def _bystanders(here: Pose, rng: np.random.Generator, most: int) -> NDArray[np.float64]:
+def bystanders(here: Pose, rng: np.random.Generator, most: int) -> NDArray[np.float64]:
     """Disks (k, 3) x, y, radius around a pose, none closer than 0.6 m."""
     count = int(rng.integers(0, most + 1))
     distance = rng.uniform(0.6, 5.0, count)

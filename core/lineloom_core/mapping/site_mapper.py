@@ -13,6 +13,7 @@ No clock, no randomness, no I/O: the same log gives the same bits, also across `
 from __future__ import annotations
 
 import pickle
+from collections.abc import Sequence
 
 from lineloom_core.mapping.advance import advance
 from lineloom_core.mapping.answers import Action, Evidence, WhatIf
@@ -22,6 +23,8 @@ from lineloom_core.mapping.constraint import Constraint
 from lineloom_core.mapping.explain import explain
 from lineloom_core.mapping.front_end import take
 from lineloom_core.mapping.history import History
+from lineloom_core.mapping.localisation import Localisation
+from lineloom_core.mapping.localise import localise
 from lineloom_core.mapping.memory import Memory
 from lineloom_core.mapping.rebuild import rebuild
 from lineloom_core.mapping.robot_record import RobotRecord
@@ -145,6 +148,10 @@ class SiteMapper:
         """What speaks for a constraint and against it; None for an unknown one."""
         known = self._find(constraint)
         return None if known is None else explain(self._site, known)
+
+    def localise(self, scans: Sequence[Scan]) -> Localisation:
+        """Where one robot's scans were taken, the latest counts; changes nothing."""
+        return localise(self._site, scans)
 
     def view(self) -> SiteView:
         """Everything there is to know at this version; changes nothing."""

@@ -1,10 +1,17 @@
 """Places: submaps that are recognised without any pose."""
 
-from lineloom_core.places.place import Glimpse, Place, conflicting_points, count_points
+from lineloom_core.places.place import (
+    Glimpse,
+    Place,
+    conflicting_points,
+    count_points,
+    share_explained,
+)
 from lineloom_core.places.recognition import (
     Recognition,
     RecognitionConfig,
     alias_evidence,
+    check_alignment,
     evidence_elsewhere,
     evidence_of,
     hypotheses,
@@ -18,6 +25,7 @@ __all__ = [
     "Recognition",
     "RecognitionConfig",
     "alias_evidence",
+    "check_alignment",
     "conflicting_points",
     "count_points",
     "evidence_elsewhere",
@@ -25,4 +33,5 @@ __all__ = [
     "hypotheses",
     "recognise",
     "rivals",
+    "share_explained",
 ]

@@ -113,6 +113,17 @@ def count_points(
     return float(counts[0]), float(counts[1])
 
 
+def share_explained(reference: Place, current: Place, T_reference_current: Pose) -> float:
+    """Share of the current place's points that the reference saw as well, 0..1."""
+    counts = np.zeros(4)
+    judge_cloud(
+        current.surface.points, 1, T_reference_current.to_array(), reference.ranges,
+        reference.angle_mins, reference.angle_increments, reference.sweep_poses,
+        TOLERANCE, TOLERANCE_SLOPE, counts,
+    )  # fmt: skip
+    return float(counts[0]) / max(len(current.surface.points), 1)
+
+
 def conflicting_points(
     reference: Place, current: Place, T_reference_current: Pose
 ) -> NDArray[np.float64]:
