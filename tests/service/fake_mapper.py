@@ -15,6 +15,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from lineloom_core.fusion.occupancy import Rays
 from lineloom_core.geometry import Pose
 from lineloom_core.mapping.answers import (
     Evidence,
@@ -90,6 +91,12 @@ class FakeMapper:
         self._version += 1
         self._link("restore", constraint)
         self._retracted.pop(constraint, None)
+
+    def rays(self, component: str) -> Rays:
+        """A lidar at the origin that sees five walls a metre to five metres ahead."""
+        sweep = (-1.0, 0.5)
+        ranges = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
+        return Rays.of([np.zeros(3)], [sweep], [ranges])
 
     def explain(self, constraint: str) -> Evidence:
         if constraint == "k-rejected":

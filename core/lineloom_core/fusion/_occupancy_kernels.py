@@ -14,7 +14,7 @@ Counts = NDArray[np.uint16]
 _MOST = 65_000  # where a cell's count stops
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def walk(counts: Counts, ax: float, ay: float, bx: float, by: float) -> None:
     """Count every cell that the segment a to b, in units of cells, passes through.
 
@@ -41,7 +41,7 @@ def walk(counts: Counts, ax: float, ay: float, bx: float, by: float) -> None:
             next_y += wide_y
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def cast(
     poses: Array,
     sweeps: Array,

@@ -15,6 +15,7 @@ from __future__ import annotations
 import pickle
 from collections.abc import Sequence
 
+from lineloom_core.fusion.occupancy import Rays
 from lineloom_core.mapping.advance import advance
 from lineloom_core.mapping.answers import Action, Evidence, WhatIf
 from lineloom_core.mapping.changes import Changes
@@ -26,6 +27,7 @@ from lineloom_core.mapping.history import History
 from lineloom_core.mapping.localisation import Localisation
 from lineloom_core.mapping.localise import localise
 from lineloom_core.mapping.memory import Memory
+from lineloom_core.mapping.ray_source import component_rays
 from lineloom_core.mapping.rebuild import rebuild
 from lineloom_core.mapping.robot_record import RobotRecord
 from lineloom_core.mapping.site_map import SiteMap
@@ -152,6 +154,10 @@ class SiteMapper:
     def localise(self, scans: Sequence[Scan]) -> Localisation:
         """Where one robot's scans were taken, the latest counts; changes nothing."""
         return localise(self._site, scans)
+
+    def rays(self, component: str) -> Rays:
+        """Return what the lidars saw as free, for an occupancy grid; changes nothing."""
+        return component_rays(self._site, component)
 
     def view(self) -> SiteView:
         """Everything there is to know at this version; changes nothing."""

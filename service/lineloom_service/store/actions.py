@@ -134,7 +134,7 @@ def purge_portion(tx: Transaction) -> bool:
         robots = select(tables.robots.c.id).where(tables.robots.c.site_id == site_id)
         connection.execute(delete(tables.streams).where(tables.streams.c.robot_id.in_(robots)))
         t = tables
-        for table in (t.robots, t.skips, t.snapshots, t.events, t.views):
+        for table in (t.robots, t.skips, t.snapshots, t.events, t.views, t.files):
             connection.execute(delete(table).where(table.c.site_id == site_id))
         connection.execute(delete(tables.sites).where(tables.sites.c.id == site_id))
     return True

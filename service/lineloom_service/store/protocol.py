@@ -7,6 +7,7 @@ from typing import Literal, Protocol
 
 from lineloom_service.security.token import TokenRecord
 from lineloom_service.store.database import Claim
+from lineloom_service.store.files import FileKind, FileRecord
 from lineloom_service.store.records import (
     ActionKind,
     Appended,
@@ -139,6 +140,22 @@ class Store(Protocol):
 
     async def view(self, site_id: int, after: int) -> ViewRecord | None:
         """Return the view that was saved last, unless it is not after position `after`."""
+        ...
+
+    async def put_file(self, site_id: int, kind: FileKind, file: FileRecord) -> bool:
+        """Keep a file of a site, in the place of one of its name; False where the site is gone."""
+        ...
+
+    async def read_file(self, site_id: int, kind: FileKind, name: str) -> FileRecord | None:
+        """Return a file with its data."""
+        ...
+
+    async def files(self, site_id: int, kind: FileKind) -> list[FileRecord]:
+        """Return the files of a kind, oldest first, without their data."""
+        ...
+
+    async def delete_file(self, site_id: int, kind: FileKind, name: str) -> bool:
+        """Remove a file; False where there is none of that name."""
         ...
 
     def subscribe_news(self, listener: NewsListener) -> None:

@@ -13,8 +13,9 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from lineloom_service.security.token import TokenRecord
 from lineloom_service.security.token_book import read_tokens
-from lineloom_service.store import actions, reads
+from lineloom_service.store import actions, files, reads
 from lineloom_service.store.database import Claim, Database, Work
+from lineloom_service.store.files import FileKind, FileRecord
 from lineloom_service.store.group_commit import GroupCommit
 from lineloom_service.store.protocol import NEWS, CommitListener, NewsListener
 from lineloom_service.store.records import (
@@ -181,6 +182,22 @@ class SqlStore:
     async def view(self, site_id: int, after: int) -> ViewRecord | None:
         """Return the view that was saved last, unless it is not after position `after`."""
         return await self._read(partial(reads.read_view, site_id=site_id, after=after))
+
+    async def put_file(self, site_id: int, kind: FileKind, file: FileRecord) -> bool:
+        """Keep a file of a site."""
+        return await self._write(partial(files.put_file, site_id=site_id, kind=kind, file=file))
+
+    async def read_file(self, site_id: int, kind: FileKind, name: str) -> FileRecord | None:
+        """Return a file with its data."""
+        return await self._read(partial(files.read_file, site_id=site_id, kind=kind, name=name))
+
+    async def files(self, site_id: int, kind: FileKind) -> list[FileRecord]:
+        """Return the files of a kind."""
+        return await self._read(partial(files.list_files, site_id=site_id, kind=kind))
+
+    async def delete_file(self, site_id: int, kind: FileKind, name: str) -> bool:
+        """Remove a file."""
+        return await self._write(partial(files.delete_file, site_id=site_id, kind=kind, name=name))
 
     async def claim_mapping(self, *, wait: bool) -> Claim:
         """Become the process that maps."""

@@ -161,3 +161,16 @@ tokens = Table(
     Column("created", Double, nullable=False),
     Column("revoked", Double),
 )
+
+files = Table(
+    "files",
+    metadata,
+    Column("site_id", ForeignKey("sites.id"), primary_key=True, autoincrement=False),
+    Column("kind", String(16), primary_key=True),
+    Column("name", String(128), primary_key=True),
+    Column("about", String, nullable=False),
+    Column("sha256", String(64), nullable=False),
+    Column("size", BigInteger, nullable=False),
+    Column("created", Double, nullable=False),
+    Column("data", LargeBinary, nullable=False),
+)

@@ -20,7 +20,6 @@ from lineloom_core.fusion.occupancy import (
     rasterise,
 )
 from lineloom_core.io import nav2
-from lineloom_core.mapping.ray_source import component_rays
 from lineloom_core.mapping.site_mapper import SiteMapper
 from lineloom_core.simulation import Fleet
 from numpy.typing import NDArray
@@ -149,8 +148,8 @@ def test_a_mapped_floor_is_free_where_the_robot_was() -> None:
     lines = np.array(
         [[w.x1, w.y1, w.x2, w.y2] for w in view.lines if w.component == component]
     ).reshape(-1, 4)
-    grid = rasterise(component_rays(mapper._site, component), lines)
-    assert component_rays(mapper._site, "nope").poses.shape == (0, 3)
+    grid = rasterise(mapper.rays(component), lines)
+    assert mapper.rays("nope").poses.shape == (0, 3)
     places = [k.pose for k in view.keyframes if k.component == component]
     assert len(places) >= 3
     # The cell under the laser itself is passed by its own beams.
