@@ -12,7 +12,6 @@ import numpy as np
 from lineloom import wire
 from lineloom.wire.base import Covariance
 from lineloom_core.geometry import Pose
-from lineloom_core.io.selection import ComponentContent
 from lineloom_core.mapping.site_view import ConstraintView, MapLine, RobotView, SiteView
 from lineloom_core.matching import MatchResult
 from lineloom_core.scan import Mount, Scan
@@ -128,16 +127,20 @@ def to_trajectory(robot: str, view: SiteView) -> wire.Trajectory:
     return wire.Trajectory.model_construct(robot=robot, version=view.version, poses=poses)
 
 
-def to_map(site: str, view: SiteView, contents: Iterable[ComponentContent]) -> wire.MapAnswer:
-    """Return the lines of the components chosen."""
-    chosen = list(contents)
-    return wire.MapAnswer.model_construct(
-        site=site,
-        version=view.version,
-        components=[
-            wire.MapComponent(id=c.component.id, robots=list(c.component.robots)) for c in chosen
-        ],
-        lines=[_line(line) for content in chosen for line in content.lines],
+def to_line(line: MapLine) -> wire.Line:
+    """Return a line of the map."""
+    return wire.Line.model_construct(
+        id=line.id,
+        component=line.component,
+        x1=line.x1,
+        y1=line.y1,
+        x2=line.x2,
+        y2=line.y2,
+        sigma=line.sigma,
+        support=line.support,
+        robots=list(line.robots),
+        first_seen=line.first_seen,
+        last_seen=line.last_seen,
     )
 
 
@@ -264,22 +267,6 @@ def _pose(pose: Pose) -> wire.PoseAnswer:
 def _mount(mount: Mount) -> wire.MountSettings:
     T = mount.T_base_laser
     return wire.MountSettings(x=T.x, y=T.y, theta=T.theta, inverted=mount.inverted)
-
-
-def _line(line: MapLine) -> wire.Line:
-    return wire.Line.model_construct(
-        id=line.id,
-        component=line.component,
-        x1=line.x1,
-        y1=line.y1,
-        x2=line.x2,
-        y2=line.y2,
-        sigma=line.sigma,
-        support=line.support,
-        robots=list(line.robots),
-        first_seen=line.first_seen,
-        last_seen=line.last_seen,
-    )
 
 
 def _matrix(matrix: NDArray[np.float64]) -> Covariance:

@@ -67,6 +67,9 @@ class Settings(BaseSettings):
         default=10.0, ge=0.0, description="Time for last snapshots when the service stops."
     )
 
+    map_cache_bytes: int = Field(
+        default=64 * 1024 * 1024, ge=0, description="Rendered maps kept for the next who asks."
+    )
     event_history: int = Field(
         default=5_000, ge=1, description="Published views of a site whose events are kept."
     )

@@ -272,3 +272,28 @@ async def test_alive_and_ready(client: httpx.AsyncClient) -> None:
         assert response.json()["reasons"]
         await asyncio.sleep(0.02)
     assert response.json() == {"ready": True, "reasons": []}
+
+
+async def test_only_what_changed_since_a_version(
+    client: httpx.AsyncClient, make_scan: Make, idle: Idle
+) -> None:
+    url = "/v1/sites/delta/map"
+    await client.post("/v1/sites/delta/robots/r/scans", json=make_scan(0))
+    await idle("delta")
+    first = (await client.get(url)).json()
+    assert not {"since", "full", "removed"} & set(first)
+    same = (await client.get(url, params={"since": first["version"]})).json()
+    assert (same["full"], same["lines"], same["removed"]) == (False, [], [])
+    await client.post("/v1/sites/delta/robots/r/scans", json=make_scan(1))
+    await idle("delta")
+    changes = (await client.get(url, params={"since": first["version"]})).json()
+    assert (changes["full"], changes["since"]) == (False, first["version"])
+    # The fake mapper's lines have new ids with every scan.
+    assert changes["removed"] == [line["id"] for line in first["lines"]]
+    assert changes["lines"] == (await client.get(url)).json()["lines"]
+    unknown = (await client.get(url, params={"since": "12345"})).json()
+    assert unknown["full"] is True
+    assert unknown["lines"] == changes["lines"]
+    for since in ("-1", "x", "1.5", str(2**63)):
+        await _expect_refusal(client, url, 422, "invalid-parameter", since=since)
+    await _expect_refusal(client, url, 422, "invalid-parameter", since="1", format="svg")

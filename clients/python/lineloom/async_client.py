@@ -131,10 +131,18 @@ class AsyncClient:
         return await self._send(calls.transform(site, robot_a, robot_b))
 
     async def map(
-        self, site: str, *, component: str | None = None, bbox: Box | None = None
+        self,
+        site: str,
+        *,
+        component: str | None = None,
+        bbox: Box | None = None,
+        since: int | None = None,
     ) -> MapAnswer:
-        """Return the fused line map; bbox = (min x, min y, max x, max y) in the map frame."""
-        return await self._send(calls.map_lines(site, component, bbox))
+        """Return the fused line map; bbox = (min x, min y, max x, max y) in the map frame.
+
+        since: a version; the answer has only what changed after it, unless `full`.
+        """
+        return await self._send(calls.map_lines(site, component, bbox, since))
 
     async def map_file(
         self,

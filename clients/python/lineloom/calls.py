@@ -129,9 +129,13 @@ def transform(site: str, robot_a: str, robot_b: str) -> Call[Transform]:
     return Call("GET", path, _model(Transform))
 
 
-def map_lines(site: str, component: str | None, bbox: Box | None) -> Call[MapAnswer]:
-    """GET the fused line map."""
+def map_lines(
+    site: str, component: str | None, bbox: Box | None, since: int | None = None
+) -> Call[MapAnswer]:
+    """GET the fused line map, or what changed in it after a version."""
     params = _map_params("json", component, bbox)
+    if since is not None:
+        params["since"] = str(since)
     return Call("GET", f"{_site(site)}/map", _model(MapAnswer), params=params)
 
 

@@ -127,9 +127,19 @@ class Client:
         """Return T_a_b; raises ConflictError while the two are not connected."""
         return self._send(calls.transform(site, robot_a, robot_b))
 
-    def map(self, site: str, *, component: str | None = None, bbox: Box | None = None) -> MapAnswer:
-        """Return the fused line map; bbox = (min x, min y, max x, max y) in the map frame."""
-        return self._send(calls.map_lines(site, component, bbox))
+    def map(
+        self,
+        site: str,
+        *,
+        component: str | None = None,
+        bbox: Box | None = None,
+        since: int | None = None,
+    ) -> MapAnswer:
+        """Return the fused line map; bbox = (min x, min y, max x, max y) in the map frame.
+
+        since: a version; the answer has only what changed after it, unless `full`.
+        """
+        return self._send(calls.map_lines(site, component, bbox, since))
 
     def map_file(
         self,

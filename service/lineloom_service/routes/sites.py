@@ -32,4 +32,5 @@ async def delete_site(site: KnownSite, service: ServiceDep) -> Response:
     deleted = await service.store.delete_site(site.name)
     if deleted is not None:
         await service.conductor.forget_site(deleted)
+        service.maps.forget_site(deleted)
     return Response(status_code=204)

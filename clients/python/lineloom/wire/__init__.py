@@ -29,7 +29,7 @@ from lineloom.wire.evidence import (
 )
 from lineloom.wire.graph import Graph, GraphEdge, GraphNode, GraphSummary
 from lineloom.wire.ingest import IngestAnswer, RejectedScan, ScanBatch
-from lineloom.wire.map import Line, MapAnswer, MapComponent
+from lineloom.wire.map import Line, MapAnswer, MapChanges, MapComponent
 from lineloom.wire.match import Alternative, LinePair, MatchAnswer, MatchRequest, MatchScan
 from lineloom.wire.packing import JSON, MSGPACK, pack_json, pack_msgpack
 from lineloom.wire.pose import PoseAnswer, UncertainPose
@@ -71,6 +71,7 @@ __all__ = [
     "Line",
     "LinePair",
     "MapAnswer",
+    "MapChanges",
     "MapComponent",
     "MapEvent",
     "MatchAnswer",

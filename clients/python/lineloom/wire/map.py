@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pydantic import Field
+
 from lineloom.wire.base import Answer
 
 
@@ -32,8 +34,21 @@ class Line(Answer):
     last_seen: float
 
 
-class MapAnswer(Answer):
-    """All lines of a site at one version."""
+class MapChanges(Answer):
+    """What an answer to `?since=` has besides.
+
+    full: the version asked from is not known (any more), so `lines` is the whole map. Else `lines`
+    has only what is new or changed since, and `removed` the ids of lines that are gone, or no
+    longer among those asked for; some may never have been.
+    """
+
+    since: int | None = None
+    full: bool = True
+    removed: list[str] = Field(default_factory=list)
+
+
+class MapAnswer(MapChanges):
+    """The lines of a site at one version."""
 
     site: str
     version: int

@@ -1,0 +1,51 @@
+"""The maps of all sites, ready to be sent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from lineloom_core.io.selection import BBox
+from lineloom_core.mapping.site_view import SiteView
+
+from lineloom_service.maps.line_history import LineHistory
+from lineloom_service.maps.map_json import write_line, write_map
+from lineloom_service.maps.render_cache import RenderCache
+from lineloom_service.store.records import SiteRecord
+
+
+class MapStore:
+    """Renders views, each form of each version once. limit: bytes kept."""
+
+    def __init__(self, limit: int) -> None:
+        self._cache = RenderCache(limit)
+        self._histories: dict[int, LineHistory] = {}
+
+    async def json(
+        self,
+        site: SiteRecord,
+        view: SiteView,
+        component: str | None = None,
+        box: BBox | None = None,
+        since: int | None = None,
+    ) -> bytes:
+        """Return the map as JSON, or what changed in it after a version."""
+        history = self._histories.setdefault(site.id, LineHistory(write_line))
+
+        def render() -> bytes:
+            return write_map(site.name, view, history.at(view), component, box, since)
+
+        return await self._cache.get((site.id, view.version, "json", component, box, since), render)
+
+    async def other(
+        self,
+        site: SiteRecord,
+        view: SiteView,
+        form: tuple[object, ...],
+        render: Callable[[], str | bytes],
+    ) -> bytes:
+        """Return the map as `render` makes it; `form` names all that tells it from others."""
+        return await self._cache.get((site.id, view.version, *form), render)
+
+    def forget_site(self, site_id: int) -> None:
+        """A site was deleted."""
+        self._histories.pop(site_id, None)

@@ -1,0 +1,156 @@
+"""The map's JSON is what the slow way writes, differences add up, and nothing is done twice."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from lineloom import wire
+from lineloom_core.io.selection import BBox, select
+from lineloom_core.mapping.site_view import ComponentView, MapLine, SiteView
+from lineloom_service.convert import to_line
+from lineloom_service.engine.conductor import EMPTY_VIEW
+from lineloom_service.maps.line_history import LineHistory
+from lineloom_service.maps.map_json import write_line, write_map
+from lineloom_service.maps.render_cache import RenderCache
+
+COMPONENTS = (ComponentView("c1", ("a", "b"), 4), ComponentView("c2", (), 1))
+BOX = (0.0, -1.0, 3.0, 1.0)
+
+
+def _views(seed: int, count: int) -> list[SiteView]:
+    """Lines come, move, change their component, go and come back."""
+    rng = np.random.default_rng(seed)
+    views, lines = [], dict[str, MapLine]()
+    for version in range(1, count):
+        for number in rng.integers(0, 25, size=6):
+            name, x = f"l{number}", float(rng.integers(0, 6))
+            component = f"c{rng.integers(1, 3)}"
+            lines[name] = MapLine(name, component, x, 0.1, x + 1, 0.0, 0.01, 3, ("a",), 0.0, x)
+        for number in rng.integers(0, 25, size=3):
+            lines.pop(f"l{number}", None)
+        kept = tuple(lines.values())
+        views.append(replace(EMPTY_VIEW, version=version, components=COMPONENTS, lines=kept))
+    return views
+
+
+def _twin(view: SiteView, component: str | None, box: BBox | None) -> dict[str, Any]:
+    chosen = select(view, component, box)
+    return wire.MapAnswer(
+        site="s",
+        version=view.version,
+        components=[
+            wire.MapComponent(id=c.component.id, robots=list(c.component.robots)) for c in chosen
+        ],
+        lines=[to_line(line) for content in chosen for line in content.lines],
+    ).model_dump(exclude_unset=True)
+
+
+def _answer(history: LineHistory, view: SiteView, *asked: Any) -> wire.MapAnswer:
+    return wire.MapAnswer.model_validate_json(write_map("s", view, history.at(view), *asked))
+
+
+CHOICES = [(None, None), ("c1", None), (None, BOX), ("c2", BOX)]
+
+
+@pytest.mark.parametrize(("component", "box"), CHOICES)
+def test_the_whole_map_is_what_the_slow_way_writes(component: str | None, box: Any) -> None:
+    history = LineHistory(write_line)
+    for view in [*_views(1, 30), *_views(1, 5)]:  # also views that are older than the history
+        answer = _answer(history, view, component, box)
+        assert answer.model_dump(exclude_unset=True) == _twin(view, component, box)
+
+
+@pytest.mark.parametrize(("component", "box"), CHOICES)
+def test_differences_add_up_from_any_version_to_any_other(component: str | None, box: Any) -> None:
+    history = LineHistory(write_line)
+    held: dict[int, dict[str, Any]] = {}
+    for view in _views(2, 40)[::2]:  # not every version was asked for
+        now = _answer(history, view, component, box)
+        whole = {line.id: line for line in now.lines}
+        for version, lines in held.items():
+            changes = _answer(history, view, component, box, version)
+            assert (changes.full, changes.since, changes.version) == (False, version, view.version)
+            kept = {name: line for name, line in lines.items() if name not in changes.removed}
+            assert {**kept, **{line.id: line for line in changes.lines}} == whole
+        held[view.version] = whole
+        same = _answer(history, view, component, box, view.version)
+        assert (same.lines, same.removed) == ([], [])
+
+
+@pytest.mark.parametrize("since", [0, 2, 7, 10**15])
+def test_from_a_version_never_answered_with_it_is_the_whole_map(since: int) -> None:
+    history = LineHistory(write_line)
+    for view in _views(3, 10)[::4]:
+        answer = _answer(history, view, None, None, since)
+        whole = _answer(history, view, None, None)
+    assert (answer.full, answer.since, answer.removed) == (True, since, [])
+    assert answer.lines == whole.lines
+
+
+def test_only_what_changed_is_written() -> None:
+    written: list[str] = []
+
+    def write(line: MapLine) -> str:
+        written.append(line.id)
+        return write_line(line)
+
+    history = LineHistory(write)
+    first, second = _views(4, 3)
+    history.at(first)
+    assert sorted(written) == sorted(line.id for line in first.lines)
+    written.clear()
+    history.at(second)
+    before = {line.id: line for line in first.lines}
+    assert written == [line.id for line in second.lines if before.get(line.id) != line]
+
+
+async def test_what_is_asked_for_at_once_is_rendered_once() -> None:
+    cache, renderings = RenderCache(100), []
+    go = threading.Event()
+
+    def render() -> bytes:
+        renderings.append(1)
+        go.wait(5.0)
+        return b"map"
+
+    waiting = [asyncio.create_task(cache.get("k", render)) for _ in range(5)]
+    await asyncio.sleep(0.05)
+    waiting[0].cancel()
+    go.set()
+    results = await asyncio.gather(*waiting, return_exceptions=True)
+    assert results[1:] == [b"map"] * 4
+    assert await cache.get("k", render) == b"map"
+    assert len(renderings) == 1
+
+
+async def test_no_more_is_kept_than_allowed_and_the_latest_used_stays() -> None:
+    cache = RenderCache(100)
+    for key in "abc":
+        await cache.get(key, lambda: "x" * 30)
+    await cache.get("a", lambda: "unused")
+    await cache.get("d", lambda: "x" * 30)
+    assert cache.size == 90
+    again: list[str] = []
+    for key in "acdb":
+        rendered = await cache.get(key, lambda: "y" * 30)
+        if rendered.startswith(b"y"):
+            again.append(key)
+    assert again == ["b"]
+    await cache.get("huge", lambda: "x" * 101)
+    assert cache.size <= 100
+
+
+async def test_a_rendering_that_fails_is_tried_again() -> None:
+    cache = RenderCache(100)
+
+    def fail() -> bytes:
+        raise RuntimeError("no")
+
+    with pytest.raises(RuntimeError):
+        await cache.get("k", fail)
+    assert await cache.get("k", lambda: "yes") == b"yes"
