@@ -17,6 +17,7 @@ _MODELS = (
     wire.ScanBatch,
     wire.RobotSettings,
     wire.MatchRequest,
+    wire.ExportRequest,
     wire.Problem,
     wire.Event,
 )

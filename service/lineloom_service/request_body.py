@@ -49,6 +49,13 @@ async def read_body(request: Request, limit: int) -> Body:
     return Body(_decode_json(data) if is_json else _decode_msgpack(data), is_json)
 
 
+async def read_raw(request: Request, limit: int) -> bytes:
+    """Return a body of another kind as it is, but decompressed. Raises as `read_body` does."""
+    is_gzip = _is_gzip(request)
+    data = await _read(request, limit)
+    return _gunzip(data, limit) if is_gzip else data
+
+
 def _is_json(request: Request) -> bool:
     content_type = request.headers.get("content-type", "").split(";")[0].strip().lower()
     if content_type not in (JSON, MSGPACK):

@@ -12,6 +12,7 @@ from lineloom_service.engine.local_engine import LocalEngine
 from lineloom_service.engine.protocol import Engine
 from lineloom_service.events.hub import EventHub
 from lineloom_service.events.recorder import EventRecorder
+from lineloom_service.floorplans import FloorPlans
 from lineloom_service.maps.map_store import MapStore
 from lineloom_service.matching import PairMatcher
 from lineloom_service.security.guard import Guard
@@ -46,6 +47,7 @@ class Service:
         self.conductor = Conductor(self.store, self.engine, settings, recorder)
         self.maps = MapStore(settings.map_cache_bytes)
         self.matcher = PairMatcher()
+        self.floorplans = FloorPlans(self.store)
         self.guard = Guard(self.store.tokens)
         self._warming: asyncio.Task[None] | None = None
 

@@ -161,7 +161,10 @@ async def test_map_formats(client: httpx.AsyncClient) -> None:
     assert geojson.headers["content-type"] == "application/geo+json"
     assert geojson.json()["type"] == "FeatureCollection"
     problem = await _expect_refusal(client, f"{SITE}/map", 422, "unknown-format", format="bmp")
-    assert problem["detail"] == "no format 'bmp'; available are json, geojson, svg, png"
+    assert (
+        problem["detail"]
+        == "no format 'bmp'; available are json, geojson, svg, png, dxf, csv, ieee1873, nav2"
+    )
 
 
 @pytest.mark.parametrize("bbox", ["", "1,2,3", "1,2,3,4,5", "a,b,c,d", "0,0,0,1", "nan,0,1,1"])

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lineloom_core.fusion import _occupancy_kernels as _kernels
+from lineloom_core.geometry import Pose
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 """Values of a cell, as in `nav_msgs/OccupancyGrid`."""
@@ -54,6 +55,11 @@ class Rays:
             starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
             ranges=np.concatenate(ranges) if len(ranges) else np.empty(0),
         )
+
+    def moved(self, T_new_old: Pose) -> Rays:
+        """Return the same rays in another frame."""
+        points, angles = T_new_old.transform(self.poses[:, :2]), self.poses[:, 2] + T_new_old.theta
+        return replace(self, poses=np.column_stack([points, angles]))
 
     def ends(self) -> NDArray[np.float64]:
         """Return where the beams with a finite return end, shape (m, 2) [m]."""

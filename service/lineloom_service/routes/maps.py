@@ -9,31 +9,27 @@ from urllib.parse import urlencode
 from fastapi import APIRouter, Header, Query, Request, Response
 from lineloom import wire
 from lineloom.wire.base import MAX_COUNTER
-from lineloom_core.io import geojson, png, svg
-from lineloom_core.io.selection import BBox, check_bbox
+from lineloom.wire.export import MapFrame
 from lineloom_core.mapping.site_view import SiteView
 
 from lineloom_service import __version__
 from lineloom_service.answers import JSON, matches, unknown_format
 from lineloom_service.dependencies import CurrentView, KnownSite, ServiceDep
 from lineloom_service.errors import INVALID_PARAMETER, UNKNOWN_COMPONENT, ProblemError
+from lineloom_service.map_files import FORMATS, read_bbox, render_map
+from lineloom_service.map_frames import in_frame
 from lineloom_service.openapi import also_as
+from lineloom_service.service import Service
+from lineloom_service.store.records import SiteRecord
 
 router = APIRouter(tags=["map"])
-
-MEDIA_TYPES = {
-    "json": JSON,
-    "geojson": "application/geo+json",
-    "svg": "image/svg+xml",
-    "png": "image/png",
-}
 
 
 @router.get(
     "/v1/sites/{site}/map",
     response_model=wire.MapAnswer,
     responses={
-        **also_as("application/geo+json", "image/svg+xml", "image/png"),
+        **also_as(*(format.media_type for name, format in FORMATS.items() if name != "json")),
         304: {"description": "The copy that If-None-Match names is current."},
         307: {"description": "The component was merged; Location is the survivor's map."},
     },
@@ -46,57 +42,51 @@ async def get_map(
     format: str = "json",
     component: Annotated[str | None, Query(description="Only this component.")] = None,
     bbox: Annotated[str | None, Query(description="x_min,y_min,x_max,y_max in metres.")] = None,
+    align: Annotated[bool, Query(description="Turned so that walls run along the axes.")] = False,
+    frame: Annotated[MapFrame, Query(description="In which coordinates.")] = "map",
+    resolution: Annotated[
+        float | None, Query(gt=0.0, le=10.0, description="Metres a cell, for nav2.")
+    ] = None,
     since: Annotated[
         int | None,
         Query(ge=0, le=MAX_COUNTER, description="A `version`: only what has changed after it."),
     ] = None,
     if_none_match: Annotated[str | None, Header()] = None,
 ) -> Response:
-    """Return the map: `format` is json, geojson, svg or png.
+    """Return the map: `format` is json, geojson, svg, png, dxf, csv, ieee1873 or nav2.
 
     With `since` (json only) only what changed after that version: lines that are new or not what
     they were, and ids that are gone; `full` says that the version is not known (any more) and that
     the answer is the whole map.
     """
-    if format not in MEDIA_TYPES:
-        raise unknown_format(format, MEDIA_TYPES)
-    if since is not None and format != "json":
-        raise ProblemError(INVALID_PARAMETER, "query parameter 'since': goes with format=json only")
-    box = _read_bbox(bbox)
+    if format not in FORMATS:
+        raise unknown_format(format, FORMATS)
+    plain = format == "json" and frame == "map" and not align
+    if since is not None and not plain:
+        detail = "query parameter 'since': goes with format=json in the map's own frame only"
+        raise ProblemError(INVALID_PARAMETER, detail)
+    box = read_bbox(bbox)
     if component is not None and all(c.id != component for c in view.components):
         return _elsewhere(request, view, component)
-    etag = f'"{site.id}-{view.version}-{__version__}"'
+    etag = await _etag(service, site, view, frame)
     headers = {"ETag": etag, "Cache-Control": "no-cache"}
     if matches(if_none_match, etag):
         return Response(status_code=304, headers=headers)
-    if format == "json":
+    if plain:
         content = await service.maps.json(site, view, component, box, since)
     else:
-        content = await service.maps.other(
-            site, view, (format, component, box), lambda: _render(view, format, component, box)
-        )
-    return Response(content, headers=headers, media_type=MEDIA_TYPES[format])
+        shown = await in_frame(service, site, view, align=align, frame=frame, component=component)
+        content = await render_map(service, site, shown, format, component, box, resolution)
+    return Response(content, headers=headers, media_type=FORMATS[format].media_type)
 
 
-def _render(view: SiteView, format: str, component: str | None, box: BBox | None) -> str | bytes:
-    if format == "geojson":
-        return json.dumps(geojson.map_features(view, component, box), separators=(",", ":"))
-    if format == "svg":
-        return svg.render_map(view, component, box)
-    return png.render_map(view, component, box)
-
-
-def _read_bbox(text: str | None) -> BBox | None:
-    if text is None:
-        return None
-    try:
-        x_min, y_min, x_max, y_max = (float(part) for part in text.split(","))
-        box = (x_min, y_min, x_max, y_max)
-        check_bbox(box)
-    except ValueError:
-        detail = "query parameter 'bbox': must be x_min,y_min,x_max,y_max with min < max"
-        raise ProblemError(INVALID_PARAMETER, detail) from None
-    return box
+async def _etag(service: Service, site: SiteRecord, view: SiteView, frame: MapFrame) -> str:
+    """Name what the answer is a function of; in the plan's frame, the plan is part of it."""
+    if frame == "map":
+        return f'"{site.id}-{view.version}-{__version__}"'
+    plan = await service.floorplans.plan(site)
+    drawn = "none" if plan is None else plan.sha256[:16]
+    return f'"{site.id}-{view.version}-{__version__}-{drawn}"'
 
 
 def _elsewhere(request: Request, view: SiteView, component: str) -> Response:

@@ -27,6 +27,8 @@ from lineloom.wire.evidence import (
     RunnerUp,
     WhatIf,
 )
+from lineloom.wire.export import Export, ExportList, ExportRequest, MapDownload
+from lineloom.wire.floorplan import FloorPlanAnswer, Placement, PlanDifferences, PlanPiece
 from lineloom.wire.graph import Graph, GraphEdge, GraphNode, GraphSummary
 from lineloom.wire.ingest import IngestAnswer, RejectedScan, ScanBatch
 from lineloom.wire.map import Line, MapAnswer, MapChanges, MapComponent
@@ -61,7 +63,11 @@ __all__ = [
     "ConstraintEvent",
     "ConstraintPage",
     "Event",
+    "Export",
+    "ExportList",
+    "ExportRequest",
     "FieldError",
+    "FloorPlanAnswer",
     "Graph",
     "GraphEdge",
     "GraphNode",
@@ -73,6 +79,7 @@ __all__ = [
     "MapAnswer",
     "MapChanges",
     "MapComponent",
+    "MapDownload",
     "MapEvent",
     "MatchAnswer",
     "MatchRequest",
@@ -80,6 +87,9 @@ __all__ = [
     "MatchedLines",
     "MountSettings",
     "Odometry",
+    "Placement",
+    "PlanDifferences",
+    "PlanPiece",
     "PoseAnswer",
     "Problem",
     "Readiness",

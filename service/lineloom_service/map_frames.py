@@ -1,0 +1,73 @@
+"""In which frame a map is shown: the robots' own, straightened, or the floor plan's."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+
+from lineloom_core.floorplan.alignment import aligning
+from lineloom_core.geometry import Pose
+from lineloom_core.io.reframe import in_frames
+from lineloom_core.mapping.site_view import SiteView
+
+from lineloom_service.errors import (
+    INVALID_PARAMETER,
+    NO_FLOOR_PLAN,
+    NOT_REGISTERED,
+    ProblemError,
+)
+from lineloom_service.floorplans import lines_of
+from lineloom_service.map_files import FramedView, ray_source
+from lineloom_service.service import Service
+from lineloom_service.store.records import SiteRecord
+
+
+async def in_frame(
+    service: Service,
+    site: SiteRecord,
+    view: SiteView,
+    *,
+    align: bool,
+    frame: str,
+    component: str | None = None,
+) -> FramedView:
+    """Return the view in the frame asked for. Raises ProblemError where there is none such.
+
+    In the plan's frame only those components are shown that have a place there.
+    """
+    if frame == "map":
+        return await asyncio.to_thread(_aligned, view) if align else FramedView(view)
+    if frame != "plan":
+        raise ProblemError(INVALID_PARAMETER, f"frame: must be map or plan, not {frame!r}")
+    if align:
+        raise ProblemError(INVALID_PARAMETER, "align: the floor plan says how the map lies")
+    return await _in_plan(service, site, view, component)
+
+
+def _aligned(view: SiteView) -> FramedView:
+    frames = {c.id: aligning(lines_of(view, c.id)) for c in view.components}
+    return FramedView(in_frames(view, frames), frames)
+
+
+async def _in_plan(
+    service: Service, site: SiteRecord, view: SiteView, component: str | None
+) -> FramedView:
+    plan = await service.floorplans.plan(site)
+    if plan is None:
+        raise ProblemError(NO_FLOOR_PLAN, f"site {site.name!r} has no floor plan; PUT one")
+    wanted = [c.id for c in view.components if component in (None, c.id)]
+    placed = await service.floorplans.placements(
+        ray_source(service, site), site, view, plan, wanted
+    )
+    frames: dict[str, Pose] = {
+        name: p.T_plan_map for name, p in placed.items() if p.T_plan_map is not None
+    }
+    if not frames:
+        why = "; ".join(f"{name}: {p.reason}" for name, p in placed.items()) or "nothing is mapped"
+        raise ProblemError(NOT_REGISTERED, why)
+    shown = replace(
+        view,
+        components=tuple(c for c in view.components if c.id in frames),
+        lines=tuple(w for w in view.lines if w.component in frames),
+    )
+    return FramedView(in_frames(shown, frames), frames)
