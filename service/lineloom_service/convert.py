@@ -17,7 +17,7 @@ from lineloom_core.matching import MatchResult
 from lineloom_core.scan import Mount, Scan
 from numpy.typing import NDArray
 
-from lineloom_service.engine.site_runner import Published
+from lineloom_service.engine.published import Published
 from lineloom_service.relative_pose import RelativePose
 from lineloom_service.store.codec import decode_mount
 from lineloom_service.store.records import RobotRecord, SiteRecord, Skip

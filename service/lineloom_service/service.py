@@ -18,7 +18,7 @@ from lineloom_service.matching import PairMatcher
 from lineloom_service.security.guard import Guard
 from lineloom_service.settings import Settings
 from lineloom_service.store.choice import database_at
-from lineloom_service.store.protocol import Store
+from lineloom_service.store.protocol import NewsKind, Store
 from lineloom_service.store.sql_store import SqlStore
 
 _LOG = logging.getLogger(__name__)
@@ -46,6 +46,7 @@ class Service:
         )
         self.conductor = Conductor(self.store, self.engine, settings, recorder)
         self.maps = MapStore(settings.map_cache_bytes)
+        self.store.subscribe_news(self._on_news)
         self.matcher = PairMatcher()
         self.floorplans = FloorPlans(self.store)
         self.guard = Guard(self.store.tokens)
@@ -74,6 +75,10 @@ class Service:
         await self.guard.stop()
         await self.conductor.stop()
         await self.store.close()
+
+    def _on_news(self, kind: NewsKind, key: str) -> None:
+        if kind == "events":
+            self.events.wake(int(key))
 
     def not_ready(self) -> list[str]:
         """Return why the service is not ready; empty when it is."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from lineloom.wire import MAX_BATCH, MAX_BODY_BYTES
 from pydantic import Field, field_validator, model_validator
@@ -39,6 +39,11 @@ class Settings(BaseSettings):
     )
     log_level: str = "info"
 
+    engine: Literal["standby", "require", "off"] = Field(
+        default="standby",
+        description="Where another process on the same database maps: wait for its end, refuse to "
+        "start, or never map at all.",
+    )
     workers: int = Field(default_factory=_default_workers, ge=1, le=64)
     max_body_bytes: int = Field(default=MAX_BODY_BYTES, ge=1024)
     max_batch: int = Field(default=MAX_BATCH, ge=1, le=MAX_BATCH)

@@ -17,6 +17,8 @@ from lineloom_service.engine.local_engine import LocalEngine
 from lineloom_service.service import Service
 from lineloom_service.settings import Settings
 
+from tests.service.databases import KINDS, fresh_database
+
 # Worker processes inherit the path and import `fake_mapper` by its plain name.
 sys.path.insert(0, str(Path(__file__).parents[1] / "service"))
 
@@ -24,11 +26,21 @@ BACKLOG_LIMIT = 500
 _NUMBERS = count()
 
 
+@pytest_asyncio.fixture(scope="module", loop_scope="module", params=KINDS)
+async def database_url(request: pytest.FixtureRequest) -> AsyncIterator[str | None]:
+    """An empty database of each kind in turn: its URL, None for a SQLite file."""
+    async with fresh_database(request.param) as url:
+        yield url
+
+
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def service(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Service]:
+async def service(
+    database_url: str | None, tmp_path_factory: pytest.TempPathFactory
+) -> AsyncIterator[Service]:
     """A running service."""
     settings = Settings(
         data_dir=tmp_path_factory.mktemp("data"),
+        database_url=database_url,
         gap_window_s=0.2,
         backlog_limit=BACKLOG_LIMIT,
         publish_every_s=0.05,

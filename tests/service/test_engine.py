@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+import sys
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -16,15 +17,22 @@ from lineloom_core.mapping.site_view import SiteView
 from lineloom_core.scan import Mount, Scan
 from lineloom_service.engine.conductor import Conductor
 from lineloom_service.engine.local_engine import LocalEngine
-from lineloom_service.engine.site_runner import Published
+from lineloom_service.engine.published import Published
 from lineloom_service.settings import Settings
+from lineloom_service.store.choice import database_at
 from lineloom_service.store.codec import decode_scan, encode_mount, encode_scan
 from lineloom_service.store.records import NewScan, SnapshotRecord
 from lineloom_service.store.sql_store import SqlStore
-from lineloom_service.store.sqlite_database import SqliteDatabase
 
 RAISES, CRASHES, RAISES_ONCE = 666.0, 667.0, 668.0
 FAKE = "fake_mapper:FakeMapper"
+DATABASE_URL: str | None = None
+"""Set for each test: None for SQLite."""
+
+
+@pytest.fixture(autouse=True)
+def on_each_database(database_url: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.modules[__name__], "DATABASE_URL", database_url)
 
 
 def _scan(seq: int, stamp: float | None = None) -> NewScan:
@@ -47,6 +55,7 @@ class System:
     def __init__(self, path: Path, **changes: object) -> None:
         values: dict[str, object] = {
             "data_dir": path,
+            "database_url": DATABASE_URL,
             "gap_window_s": 0.1,
             "chunk": 8,
             "publish_every_s": 0.05,
@@ -55,7 +64,7 @@ class System:
         }
         self.settings = Settings.model_validate({**values, **changes})
         self.store = SqlStore(
-            SqliteDatabase(self.settings.database_path),
+            database_at(self.settings.database_url, self.settings.database_path),
             gap_window_s=self.settings.gap_window_s,
             max_held=100,
         )
@@ -109,7 +118,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[int, tuple[st
     """The view after scans 0..199 in a run that nothing happened to."""
 
     async def run() -> tuple[int, tuple[str, ...]]:
-        async with _running(tmp_path_factory.mktemp("undisturbed")) as system:
+        async with _running(tmp_path_factory.mktemp("undisturbed"), database_url=None) as system:
             await system.post(range(200))
             return _fingerprint((await system.caught_up()).view)
 

@@ -17,7 +17,7 @@ from lineloom_core.mapping.site_view import (
     RobotView,
     SiteView,
 )
-from lineloom_service.engine.conductor import EMPTY_VIEW
+from lineloom_service.engine.published import EMPTY_VIEW
 from lineloom_service.events.difference import MOST_LINES_LISTED, events_between
 
 

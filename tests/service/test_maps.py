@@ -13,7 +13,7 @@ from lineloom import wire
 from lineloom_core.io.selection import BBox, select
 from lineloom_core.mapping.site_view import ComponentView, MapLine, SiteView
 from lineloom_service.convert import to_line
-from lineloom_service.engine.conductor import EMPTY_VIEW
+from lineloom_service.engine.published import EMPTY_VIEW
 from lineloom_service.maps.line_history import LineHistory
 from lineloom_service.maps.map_json import write_line, write_map
 from lineloom_service.maps.render_cache import RenderCache

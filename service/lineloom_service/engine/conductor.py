@@ -1,4 +1,8 @@
-"""Brings every site's log into its map: between the store and the engine."""
+"""Brings every site's log into its map: between the store and the engine.
+
+Of all processes that share a store one maps, the others answer from the views that it saves and
+wait for their turn.
+"""
 
 from __future__ import annotations
 
@@ -10,32 +14,24 @@ from typing import Any
 import lineloom_core
 from lineloom_core.mapping.site_view import SiteView
 
+from lineloom_service.engine.forwarding import Forwarding
 from lineloom_service.engine.protocol import Engine, Recorder
-from lineloom_service.engine.site_runner import Pace, Published, SiteRunner
+from lineloom_service.engine.published import NOTHING, Published
+from lineloom_service.engine.shared_views import SharedViews
+from lineloom_service.engine.site_runner import Pace, SiteRunner
 from lineloom_service.settings import Settings
-from lineloom_service.store.protocol import Store
-from lineloom_service.store.records import SiteRecord, Skip
+from lineloom_service.store.database import Claim, ClaimedError
+from lineloom_service.store.protocol import NewsKind, Store
+from lineloom_service.store.records import SiteRecord, Skip, StoreError
 
 _LOOK_AGAIN_S = 0.02
 
 _LOG = logging.getLogger(__name__)
-
-EMPTY_VIEW = SiteView(
-    version=0,
-    robots={},
-    components=(),
-    merged_into={},
-    trajectories={},
-    lines=(),
-    keyframes=(),
-    constraints=(),
-)
-NOTHING = Published(0, 0, 0, EMPTY_VIEW)
-"""What is known of a site before its first view."""
+_AGAIN_S = 1.0
 
 
 class Conductor:
-    """One SiteRunner per site, and the latest view of each for the queries."""
+    """One SiteRunner per site while it is this process that maps; the latest view of each."""
 
     def __init__(
         self,
@@ -49,32 +45,45 @@ class Conductor:
         self._recorder = recorder
         self._pace = Pace(settings.chunk, settings.snapshot_every, settings.snapshot_idle_s)
         self._stop_grace_s = settings.stop_grace_s
+        self._mode = settings.engine
         self._runners: dict[int, SiteRunner] = {}
         self._tasks: dict[int, asyncio.Task[None]] = {}
+        self._views = SharedViews(store)
+        self._forwarding = Forwarding(store, engine.ask)
+        self._turns: asyncio.Task[None] | None = None
         self._forgetting: set[asyncio.Task[None]] = set()
-        self._stopping = False
+        self._mapping = self._was_standby = False
 
     async def start(self) -> None:
-        """Start the engine and every site that the store knows."""
+        """Map every site that the store knows, or answer from what another process maps."""
         self._store.subscribe(self._on_commit)
+        self._store.subscribe_news(self._on_news)
         self._engine.subscribe(self._on_view)
-        await self._engine.start()
-        for record in await self._store.sites():
-            if record.id not in self._runners:
-                self._runner(record)
+        if self._store.shared:
+            for record in await self._store.sites():
+                self._views.fetch(record.id)
+        if self._mode == "off":
+            _LOG.warning("this process answers and takes scans, and never maps")
+            return
+        claim = await self._first_claim()
+        if claim is not None:
+            await self._begin()
+        if self._store.shared:
+            self._turns = asyncio.create_task(self._take_turns(claim), name="mapping-turns")
 
     async def stop(self) -> None:
         """Save what was mapped since the last snapshots, as far as the grace period allows."""
-        self._stopping = True
-        for task in self._tasks.values():
-            task.cancel()
-        await asyncio.gather(*self._tasks.values(), return_exceptions=True)
+        if self._turns is not None:
+            self._turns.cancel()
+            await asyncio.gather(self._turns, return_exceptions=True)
+        await self._end_runners()
         savings = [asyncio.ensure_future(runner.finish()) for runner in self._runners.values()]
         if savings:
             _, late = await asyncio.wait(savings, timeout=self._stop_grace_s)
             for saving in late:
                 saving.cancel()
             await asyncio.gather(*savings, return_exceptions=True)
+        await self._views.stop()
         if self._recorder is not None:
             await self._recorder.stop()
         await self._engine.stop()
@@ -82,14 +91,20 @@ class Conductor:
     def published(self, site_id: int) -> Published:
         """Return the latest view of a site; never waits."""
         runner = self._runners.get(site_id)
-        return NOTHING if runner is None or runner.published is None else runner.published
+        here = NOTHING if runner is None or runner.published is None else runner.published
+        elsewhere = self._views.get(site_id) or NOTHING
+        # After taking over, what the former one published stands until our own map is as far.
+        return here if here.position >= elsewhere.position else elsewhere
 
     async def ask(self, site_id: int, question: str, *arguments: object) -> Any:
         """Ask a site's mapper; it may be in the middle of a chunk of scans.
 
         Raises WorkerDiedError where it is not running, QuestionFailedError where it cannot say.
         """
-        return await self._engine.ask(site_id, question, *arguments)
+        asked = (
+            self._engine.ask if self._mapping or not self._store.shared else self._forwarding.ask
+        )
+        return await asked(site_id, question, *arguments)
 
     async def reached(self, site_id: int, position: int, within_s: float) -> bool:
         """Wait until the published view holds the entry at `position`; False if it takes longer."""
@@ -102,13 +117,63 @@ class Conductor:
 
     def skips(self, site_id: int) -> list[Skip]:
         """Return the entries of a site that are not in its map for good."""
-        runner = self._runners.get(site_id)
-        return [] if runner is None else [runner.skips[at] for at in sorted(runner.skips)]
+        return list(self.published(site_id).skips)
 
     def not_ready(self) -> list[str]:
         """Return what is missing before scans are mapped and queries answer as before."""
+        unseen = [f"the view of site {site} is being loaded" for site in self._views.waiting()]
+        if self._was_standby or not self._mapping:
+            return unseen  # taking over, it goes on answering
         restoring = [r.name for r in self._runners.values() if not r.restored.is_set()]
-        return self._engine.not_ready() + [f"site {name} is being restored" for name in restoring]
+        reasons = [f"site {name} is being restored" for name in restoring]
+        return self._engine.not_ready() + reasons + unseen
+
+    async def _first_claim(self) -> Claim | None:
+        try:
+            return await self._store.claim_mapping(wait=False)
+        except ClaimedError as error:
+            if self._mode == "require":
+                raise StoreError(str(error)) from error
+            _LOG.warning(
+                "%s. This process takes scans, answers, and maps when that one ends", error
+            )
+            return None
+
+    async def _take_turns(self, claim: Claim | None) -> None:
+        """Map whenever no other process does."""
+        while True:
+            if claim is None:
+                self._was_standby = True
+                try:
+                    claim = await self._store.claim_mapping(wait=True)
+                except StoreError:
+                    await asyncio.sleep(_AGAIN_S)
+                    continue
+                _LOG.warning("no other engine has this database: this process maps from now on")
+                await self._begin()
+            await claim.lost.wait()
+            claim = None
+            _LOG.error("the database has ended our right to map; waiting for the next turn")
+            await self._end_runners()
+            self._runners.clear()
+            await self._engine.stop()
+            if self._recorder is not None:
+                self._recorder.release()
+
+    async def _begin(self) -> None:
+        await self._engine.start()
+        records = await self._store.sites()
+        self._mapping = True
+        for record in records:
+            if record.id not in self._runners:
+                self._runner(record)
+
+    async def _end_runners(self) -> None:
+        self._mapping = False
+        for task in self._tasks.values():
+            task.cancel()
+        await asyncio.gather(*self._tasks.values(), return_exceptions=True)
+        self._tasks.clear()
 
     async def forget_site(self, site_id: int) -> None:
         """Stop mapping a site that was deleted."""
@@ -119,6 +184,7 @@ class Conductor:
             with contextlib.suppress(asyncio.CancelledError):
                 await task
         self._engine.stop_site(site_id)
+        self._views.forget_site(site_id)
         if self._recorder is not None:
             self._recorder.forget_site(site_id)
 
@@ -138,23 +204,31 @@ class Conductor:
         return runner
 
     def _on_commit(self, record: SiteRecord) -> None:
-        if self._stopping:
-            return
-        runner = self._runners.get(record.id)
         if record.deleted:
             forgetting = asyncio.create_task(self.forget_site(record.id))
             self._forgetting.add(forgetting)
             forgetting.add_done_callback(self._forgetting.discard)
-        elif runner is None:
+        elif (runner := self._runners.get(record.id)) is not None:
+            runner.on_commit(record)
+        elif self._mapping:
             # New: nothing to restore, so it does not keep the service from being ready.
             self._runner(record).restored.set()
-        else:
-            runner.on_commit(record)
+
+    def _on_news(self, kind: NewsKind, key: str) -> None:
+        if kind == "view" and not self._mapping:
+            self._views.fetch(int(key))
+        elif kind == "answer":
+            self._forwarding.on_answer(key)
+        elif kind == "question" and self._mapping:
+            self._forwarding.on_question(key)
 
     def _on_view(self, site_id: int, position: int, view: SiteView) -> None:
         runner = self._runners.get(site_id)
-        if runner is not None:
-            runner.on_view(position, view)
+        if runner is None:
+            return
+        runner.on_view(position, view)
+        if self._store.shared and runner.published is not None:
+            self._views.save(site_id, runner.published)
 
 
 def _report_end(task: asyncio.Task[None]) -> None:

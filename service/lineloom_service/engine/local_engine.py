@@ -94,7 +94,9 @@ class LocalEngine:
 
     async def start(self) -> None:
         """Spawn the workers."""
+        self._stopping = False
         for slot in self._slots:
+            slot.ready.clear()
             self._spawn(slot)
 
     async def stop(self) -> None:
@@ -103,8 +105,11 @@ class LocalEngine:
         for slot in self._slots:
             if slot.process is not None:
                 slot.process.kill()
+                slot.process = None
+            slot.sites.clear()
         for site in self._sites.values():
-            site.fail(WorkerDiedError(None, "the service is stopping", killed=True))
+            site.fail(WorkerDiedError(None, "the engine is stopping", killed=True))
+        self._sites.clear()
 
     def subscribe(self, listener: ViewListener) -> None:
         """Have `listener` told of published views."""
@@ -186,16 +191,18 @@ class LocalEngine:
     def _spawn(self, slot: _Slot) -> None:
         if self._stopping:
             return
-        slot.process = WorkerProcess(
+        process = slot.process = WorkerProcess(
             f"lineloom-worker-{slot.number}",
             self._mapper,
             self._warm_up,
             self._publish_every_s,
-            on_report=lambda report: self._on_report(slot, report),
-            on_death=lambda: self._on_death(slot),
+            on_report=lambda report: self._on_report(slot, process, report),
+            on_death=lambda: self._on_death(slot, process),
         )
 
-    def _on_report(self, slot: _Slot, report: Report) -> None:
+    def _on_report(self, slot: _Slot, process: WorkerProcess, report: Report) -> None:
+        if process is not slot.process:
+            return
         if isinstance(report, Ready):
             slot.stillborn = 0
             slot.ready.set()
@@ -213,10 +220,9 @@ class LocalEngine:
         elif hosted.awaited:
             _resolve(hosted.awaited.popleft(), report)
 
-    def _on_death(self, slot: _Slot) -> None:
-        process = slot.process
-        if self._stopping or process is None:
-            return
+    def _on_death(self, slot: _Slot, process: WorkerProcess) -> None:
+        if process is not slot.process:
+            return  # we ended it
         slot.last_words = process.last_words
         _LOG.warning("worker %d (process %s): %s", slot.number, process.pid, slot.last_words)
         slot.stillborn = 0 if process.ready else slot.stillborn + 1

@@ -51,7 +51,7 @@ class Engine(Protocol):
     """
 
     async def start(self) -> None:
-        """Begin; it need not be ready yet."""
+        """Begin, also after `stop`; it need not be ready yet."""
         ...
 
     async def stop(self) -> None:
@@ -126,6 +126,10 @@ class Recorder(Protocol):
 
     def forget_site(self, site_id: int) -> None:
         """A site was deleted."""
+        ...
+
+    def release(self) -> None:
+        """Another process records from now on."""
         ...
 
     async def stop(self) -> None:

@@ -16,6 +16,7 @@ from lineloom_service.engine.protocol import (
     RestoreFailedError,
     WorkerDiedError,
 )
+from lineloom_service.engine.published import Published
 from lineloom_service.store.protocol import Store
 from lineloom_service.store.records import LogEntry, SiteRecord, Skip, SnapshotRecord, StoreError
 
@@ -33,19 +34,6 @@ _STRIKES = {"raised": 2, "crashed": 3, "killed": 10}
 Raising is deterministic, and the second time excludes a passing shortage. A crash is likely the
 entry's fault. SIGKILL most likely is not: an operator, or the kernel short of memory.
 """
-
-
-@dataclass(frozen=True, slots=True)
-class Published:
-    """What queries see: the view after the entry at `position`.
-
-    scans, skipped: how many of the scans among 1..position are in the map, and how many not.
-    """
-
-    position: int
-    scans: int
-    skipped: int
-    view: SiteView
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,8 +87,9 @@ class SiteRunner:
         if self.published is not None and position < self.published.position:
             return
         scans = self._marks.get(position, self._scans_done)
-        skipped = sum(s.kind == "scan" for s in self.skips.values() if s.position <= position)
-        self.published = Published(position, scans, skipped, view)
+        left_out = tuple(s for _, s in sorted(self.skips.items()) if s.position <= position)
+        skipped = sum(skip.kind == "scan" for skip in left_out)
+        self.published = Published(position, scans, skipped, view, left_out)
         self._marks = {at: n for at, n in self._marks.items() if at >= position}
         if self._recorder is not None:
             self._recorder.on_view(self.site, position, view)

@@ -33,6 +33,13 @@ class EventHub:
         channel.recent.append((number, events))
         self._wake(channel)
 
+    def wake(self, site_id: int) -> None:
+        """Another process has stored a batch: those who wait are to look into the store."""
+        channel = self._channels.get(site_id)
+        if channel is not None:
+            channel.recent.clear()
+            self._wake(channel)
+
     def recent(self, site_id: int, after: int) -> list[tuple[int, Sequence[Told]]]:
         """Return the batches after `after`; empty also where the first one is not at hand."""
         channel = self._channels.get(site_id)

@@ -103,6 +103,13 @@ class EventRecorder:
             history.task.cancel()
         self._hub.close_site(site_id)
 
+    def release(self) -> None:
+        """Another process goes on from here: what is not on disk yet is its to tell."""
+        for history in self._histories.values():
+            if history.task is not None:
+                history.task.cancel()
+        self._histories.clear()
+
     async def stop(self) -> None:
         """Write what is waiting, and let the listeners go."""
         for site_id in list(self._histories):

@@ -13,6 +13,7 @@ from sqlalchemy import Connection, delete, func, insert, select, update
 from lineloom_service.store import tables
 from lineloom_service.store.database import notify
 from lineloom_service.store.ledger import SiteLedger
+from lineloom_service.store.questions import drop_questions
 from lineloom_service.store.reads import read_skips
 from lineloom_service.store.records import (
     ActionKind,
@@ -229,6 +230,7 @@ def save_view(connection: Connection, site_id: int, view: ViewRecord, term: int)
 def begin_term(tx: Transaction) -> int:
     """Count another engine; what former ones write from now on is refused."""
     tx.connection.execute(update(tables.clock).values(term=tx.term + 1))
+    drop_questions(tx.connection)
     return tx.term + 1
 
 

@@ -67,9 +67,7 @@ class PostgresDatabase:
         if self._listening is not None:
             self._listening.cancel()
             await asyncio.gather(self._listening, return_exceptions=True)
-        if self._holding is not None:
-            await self._holding.invalidate()
-            await self._holding.close()
+        await self._let_go()
         await self._engine.dispose()
 
     async def read(self, work: Work[T]) -> T:
@@ -98,6 +96,7 @@ class PostgresDatabase:
                 await asyncio.sleep(_AGAIN_S)
 
     async def _claim(self, wait: bool) -> Claim:
+        await self._let_go()
         session = await self._own_session()
         try:
             if wait:
@@ -110,13 +109,17 @@ class PostgresDatabase:
                         f"another mapping engine ({holder}) has this database; there can be one"
                     )
         except BaseException:
-            await session.invalidate()
-            await session.close()
+            await _end(session)
             raise
         claim = Claim()
         await _on_end(session, claim.lost)
         self._holding = session
         return claim
+
+    async def _let_go(self) -> None:
+        session, self._holding = self._holding, None
+        if session is not None:
+            await _end(session)
 
     async def _own_session(self) -> AsyncConnection:
         """Return a connection that stays out of the pool, and out of any transaction."""
@@ -137,8 +140,7 @@ class PostgresDatabase:
                     self._tell("")  # whatever was said before nobody heard
                     await ended.wait()
                 finally:
-                    await session.invalidate()
-                    await session.close()
+                    await _end(session)
             except _LOST as error:
                 _LOG.warning("no notices from the database: %s", _first_line(error))
             await asyncio.sleep(_AGAIN_S)
@@ -146,6 +148,13 @@ class PostgresDatabase:
     def _tell(self, notice: str) -> None:
         for listener in self._listeners:
             listener(notice)
+
+
+async def _end(session: AsyncConnection) -> None:
+    """Close a session for good: one that the pool took back would keep its locks."""
+    if not session.closed:
+        await session.invalidate()
+        await session.close()
 
 
 async def _on_end(session: AsyncConnection, ended: asyncio.Event) -> None:

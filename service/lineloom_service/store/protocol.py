@@ -24,11 +24,16 @@ CommitListener = Callable[[SiteRecord], None]
 """Called on the event loop with every site at `open`, and after each commit, of whatever process,
 with those that it changed, before the request is answered."""
 
-NewsKind = Literal["view", "events"]
-NEWS: dict[str, NewsKind] = {"view": "view", "events": "events"}
+NewsKind = Literal["view", "events", "question", "answer"]
+NEWS: dict[str, NewsKind] = {
+    "view": "view",
+    "events": "events",
+    "question": "question",
+    "answer": "answer",
+}
 
-NewsListener = Callable[[NewsKind, int], None]
-"""Called on the event loop with what another process saved, and the id of its site."""
+NewsListener = Callable[[NewsKind, str], None]
+"""Called on the event loop with what any process saved, and the id of its site or question."""
 
 
 class Store(Protocol):
@@ -159,7 +164,23 @@ class Store(Protocol):
         ...
 
     def subscribe_news(self, listener: NewsListener) -> None:
-        """Have `listener` told of views and events that were saved."""
+        """Have `listener` told of views, events, questions and answers that were saved."""
+        ...
+
+    async def post_question(self, key: str, question: bytes) -> None:
+        """Put a question to the process that maps."""
+        ...
+
+    async def question(self, key: str) -> bytes | None:
+        """Return a question that is not answered yet."""
+        ...
+
+    async def post_answer(self, key: str, answer: bytes) -> None:
+        """Answer it."""
+        ...
+
+    async def take_answer(self, key: str) -> bytes | None:
+        """Return the answer and forget both; None while there is none."""
         ...
 
     async def claim_mapping(self, *, wait: bool) -> Claim:

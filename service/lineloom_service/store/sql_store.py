@@ -13,7 +13,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from lineloom_service.security.token import TokenRecord
 from lineloom_service.security.token_book import read_tokens
-from lineloom_service.store import actions, files, reads
+from lineloom_service.store import actions, files, questions, reads
 from lineloom_service.store.database import Claim, Database, Work
 from lineloom_service.store.files import FileKind, FileRecord
 from lineloom_service.store.group_commit import GroupCommit
@@ -173,11 +173,9 @@ class SqlStore:
 
     async def save_view(self, site_id: int, view: ViewRecord) -> None:
         """Keep a view for other processes. Not by the writer: a large one delays no scans."""
-        work = partial(actions.save_view, site_id=site_id, view=view, term=self._term)
-        try:
-            await self._database.write(work)
-        except (SQLAlchemyError, OSError) as error:
-            raise StoreError(f"the storage failed: {type(error).__name__}") from error
+        await self._write_apart(
+            partial(actions.save_view, site_id=site_id, view=view, term=self._term)
+        )
 
     async def view(self, site_id: int, after: int) -> ViewRecord | None:
         """Return the view that was saved last, unless it is not after position `after`."""
@@ -199,6 +197,22 @@ class SqlStore:
         """Remove a file."""
         return await self._write(partial(files.delete_file, site_id=site_id, kind=kind, name=name))
 
+    async def post_question(self, key: str, question: bytes) -> None:
+        """Put a question."""
+        await self._write_apart(partial(questions.post_question, key=key, question=question))
+
+    async def question(self, key: str) -> bytes | None:
+        """Return a question."""
+        return await self._read(partial(questions.read_question, key=key))
+
+    async def post_answer(self, key: str, answer: bytes) -> None:
+        """Answer a question."""
+        await self._write_apart(partial(questions.post_answer, key=key, answer=answer))
+
+    async def take_answer(self, key: str) -> bytes | None:
+        """Return an answer and forget it."""
+        return await self._write_apart(partial(questions.take_answer, key=key))
+
     async def claim_mapping(self, *, wait: bool) -> Claim:
         """Become the process that maps."""
         claim = await self._database.claim(wait=wait)
@@ -219,13 +233,13 @@ class SqlStore:
             listener(record)
 
     def _on_notice(self, text: str) -> None:
-        what, _, number = text.partition(" ")
+        what, _, key = text.partition(" ")
         if what in NEWS:
             for listener in self._news_listeners:
-                listener(NEWS[what], int(number))
+                listener(NEWS[what], key)
             return
         # An own commit, or one seen already, is no news; lost notices may have been.
-        news = what != "commit" or int(number) > self._writer.revision
+        news = what != "commit" or int(key) > self._writer.revision
         if news and (self._refresh is None or self._refresh.done()):
             self._refresh = asyncio.create_task(self._catch_up())
 
@@ -249,6 +263,13 @@ class SqlStore:
             return action(tx)
 
         return await self._write(guarded)
+
+    async def _write_apart(self, work: Work[T]) -> T:
+        """Write what has nothing to do with the log, in a transaction of its own."""
+        try:
+            return await self._database.write(work)
+        except (SQLAlchemyError, OSError) as error:
+            raise StoreError(f"the storage failed: {type(error).__name__}") from error
 
     async def _read(self, query: Work[T]) -> T:
         try:

@@ -174,3 +174,11 @@ files = Table(
     Column("created", Double, nullable=False),
     Column("data", LargeBinary, nullable=False),
 )
+
+questions = Table(
+    "questions",
+    metadata,
+    Column("id", String(32), primary_key=True),
+    Column("question", LargeBinary, nullable=False),
+    Column("answer", LargeBinary),
+)

@@ -28,6 +28,14 @@ def serve(
             help="PostgreSQL instead of a file: postgresql+asyncpg://user:password@host/database.",
         ),
     ] = None,
+    engine: Annotated[
+        str | None,
+        typer.Option(
+            metavar="standby|require|off",
+            help="Where another process on the same database maps: wait for its end, refuse to "
+            "start, or never map; standby.",
+        ),
+    ] = None,
     workers: Annotated[
         int | None,
         typer.Option(min=1, max=64, metavar="N", help="Mapping processes; all cores but one."),
@@ -70,6 +78,7 @@ def serve(
         "port": port,
         "data_dir": data_dir,
         "database_url": database_url,
+        "engine": engine,
         "workers": workers,
         "open": open_,
         "ssl_certfile": ssl_certfile,

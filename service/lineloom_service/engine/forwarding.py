@@ -1,0 +1,91 @@
+"""Questions to mappers from processes that have none: through the store to the one that maps."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import pickle
+import uuid
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from lineloom_service.engine.protocol import QuestionFailedError, WorkerDiedError
+from lineloom_service.store.protocol import Store
+from lineloom_service.store.records import StoreError
+
+_LOG = logging.getLogger(__name__)
+
+_PATIENCE_S = 30.0
+_LOOK_S = 2.0
+"""How often an answer is looked for although no notice came: notices may be lost."""
+
+
+class Forwarding:
+    """Both ends of the line. answer: asks a mapper of this process."""
+
+    def __init__(self, store: Store, answer: Callable[..., Awaitable[Any]]) -> None:
+        self._store = store
+        self._answer = answer
+        self._waiting: dict[str, asyncio.Event] = {}
+        self._answering: set[asyncio.Task[None]] = set()
+
+    async def ask(self, site_id: int, question: str, *arguments: object) -> Any:
+        """Have the process that maps answer. Raises QuestionFailedError, WorkerDiedError."""
+        key = uuid.uuid4().hex
+        news = self._waiting[key] = asyncio.Event()
+        try:
+            await self._store.post_question(key, pickle.dumps((site_id, question, arguments)))
+            async with asyncio.timeout(_PATIENCE_S):
+                answer = await self._await_answer(key, news)
+        except (TimeoutError, StoreError) as error:
+            raise WorkerDiedError(None, "no engine has answered", killed=False) from error
+        finally:
+            del self._waiting[key]
+        outcome, value = pickle.loads(answer)
+        if outcome == "failed":
+            raise QuestionFailedError(value)
+        if outcome == "died":
+            raise WorkerDiedError(None, value, killed=False)
+        return value
+
+    def on_answer(self, key: str) -> None:
+        """There is an answer, perhaps to a question of this process."""
+        news = self._waiting.get(key)
+        if news is not None:
+            news.set()
+
+    def on_question(self, key: str) -> None:
+        """Answer, as the process that maps."""
+        task = asyncio.create_task(self._reply(key))
+        self._answering.add(task)
+        task.add_done_callback(self._answering.discard)
+
+    async def _await_answer(self, key: str, news: asyncio.Event) -> bytes:
+        while True:
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(news.wait(), _LOOK_S)
+            news.clear()
+            answer = await self._store.take_answer(key)
+            if answer is not None:
+                return answer
+
+    async def _reply(self, key: str) -> None:
+        try:
+            question = await self._store.question(key)
+            if question is None:
+                return
+            answer = await self._answered(*pickle.loads(question))
+            await self._store.post_answer(key, pickle.dumps(answer))
+        except StoreError:
+            _LOG.exception("a forwarded question is not answered")
+
+    async def _answered(
+        self, site_id: int, question: str, arguments: tuple[object, ...]
+    ) -> tuple[str, Any]:
+        try:
+            return "answered", await self._answer(site_id, question, *arguments)
+        except WorkerDiedError as error:
+            return "died", error.reason
+        except QuestionFailedError as error:
+            return "failed", str(error)
