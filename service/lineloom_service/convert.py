@@ -100,7 +100,7 @@ def to_uncertain_pose(robot: RobotView) -> wire.UncertainPose | None:
     """Return a robot's pose, None before its first scan is placed."""
     if robot.pose is None:
         return None
-    covariance = None if robot.covariance is None else _matrix(robot.covariance)
+    covariance = None if robot.covariance is None else matrix(robot.covariance)
     pose = robot.pose
     return wire.UncertainPose(x=pose.x, y=pose.y, theta=pose.theta, covariance=covariance)
 
@@ -170,7 +170,7 @@ def to_graph(site: str, view: SiteView) -> wire.Graph:
             x=c.T_a_b.x,
             y=c.T_a_b.y,
             theta=c.T_a_b.theta,
-            information=_matrix(c.information),
+            information=matrix(c.information),
             residual=c.residual,
         )
         for c in view.constraints
@@ -191,9 +191,9 @@ def to_constraint(constraint: ConstraintView, robots: Mapping[int, str]) -> wire
         robot_a=robots.get(constraint.keyframe_a),
         robot_b=robots.get(constraint.keyframe_b),
         T_a_b=_pose(constraint.T_a_b),
-        information=_matrix(constraint.information),
+        information=matrix(constraint.information),
         reason=constraint.reason,
-        checks=_figures(constraint.checks),
+        checks=figures(constraint.checks),
         consistency_set=list(constraint.consistency_set),
         residual=constraint.residual,
         history=[
@@ -211,7 +211,7 @@ def to_transform(robot_a: str, robot_b: str, view: SiteView, found: RelativePose
         component=found.component,
         version=view.version,
         T_a_b=_pose(found.T_a_b),
-        covariance=None if found.covariance is None else _matrix(found.covariance),
+        covariance=None if found.covariance is None else matrix(found.covariance),
         constraints=list(found.constraints),
     )
 
@@ -223,7 +223,7 @@ def to_match(result: MatchResult) -> wire.MatchAnswer:
         verdict=result.verdict,
         T_reference_current=None if T is None else _pose(T),
         weak_direction=result.weak_direction,
-        covariance=None if result.covariance is None else _matrix(result.covariance),
+        covariance=None if result.covariance is None else matrix(result.covariance),
         score=result.score,
         pairs=[
             wire.LinePair(
@@ -235,7 +235,7 @@ def to_match(result: MatchResult) -> wire.MatchAnswer:
             )
             for p in result.pairs
         ],
-        checks=_figures(result.checks),
+        checks=figures(result.checks),
         alternatives=[
             wire.Alternative(
                 x=a.T_reference_current.x,
@@ -269,10 +269,12 @@ def _mount(mount: Mount) -> wire.MountSettings:
     return wire.MountSettings(x=T.x, y=T.y, theta=T.theta, inverted=mount.inverted)
 
 
-def _matrix(matrix: NDArray[np.float64]) -> Covariance:
-    rows: list[list[float]] = matrix.tolist()
+def matrix(values: NDArray[np.float64]) -> Covariance:
+    """Return a 3x3 matrix, null where it is not finite."""
+    rows: list[list[float]] = values.tolist()
     return [[value if math.isfinite(value) else None for value in row] for row in rows]
 
 
-def _figures(checks: Mapping[str, float]) -> dict[str, float | None]:
+def figures(checks: Mapping[str, float]) -> dict[str, float | None]:
+    """Return figures by name, null where they are not finite."""
     return {name: float(value) if math.isfinite(value) else None for name, value in checks.items()}

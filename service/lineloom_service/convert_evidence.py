@@ -1,4 +1,4 @@
-"""Between the core's answers about constraints and the contract's."""
+"""Between the mapper's answers to questions and the contract's."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from collections.abc import Mapping
 
 from lineloom import wire
 from lineloom_core.mapping.answers import Evidence, WhatIf
+from lineloom_core.mapping.localisation import Localisation
 from lineloom_core.mapping.site_view import ConstraintView
 
-from lineloom_service.convert import to_constraint
+from lineloom_service.convert import figures, matrix, to_constraint
 
 
 def to_detail(
@@ -67,3 +68,25 @@ def to_what_if(found: WhatIf, version: int) -> wire.WhatIf:
 
 def _components(members: Mapping[str, tuple[str, ...]]) -> list[wire.ComponentRobots]:
     return [wire.ComponentRobots(id=name, robots=list(robots)) for name, robots in members.items()]
+
+
+def to_localization(site: str, found: Localisation) -> wire.LocalizeAnswer:
+    """Return where a scan may have been taken."""
+    return wire.LocalizeAnswer(
+        site=site,
+        verdict=found.verdict,
+        reason=found.reason,
+        scan=found.scan,
+        hypotheses=[
+            wire.LocalizeHypothesis(
+                component=h.component,
+                x=h.pose.x,
+                y=h.pose.y,
+                theta=h.pose.theta,
+                covariance=matrix(h.covariance),
+                score=h.score,
+                checks=figures(h.checks),
+            )
+            for h in found.hypotheses
+        ],
+    )

@@ -18,6 +18,8 @@ _MODELS = (
     wire.RobotSettings,
     wire.MatchRequest,
     wire.ExportRequest,
+    wire.MatchScan,
+    wire.LocalizeRequest,
     wire.Problem,
     wire.Event,
 )

@@ -253,6 +253,19 @@ def test_matching_sends_both_scans_and_reads_the_verdict(run: Run, fake: FakeSer
     assert (result.verdict, result.T_reference_current.x) == ("weak", 0.5)
 
 
+def test_localizing_sends_a_run_and_reads_the_hypotheses(run: Run, fake: FakeService) -> None:
+    def answer(request: httpx.Request) -> httpx.Response:
+        assert [s["seq"] for s in read_body(request)["scans"]] == [0, 1]
+        best = {"component": "c0", "x": 1.5, "y": 0, "theta": 0.1, "score": 0.97}
+        best |= {"covariance": [[0.01, 0, 0], [0, 0.01, 0], [0, 0, None]], "checks": {"margin": 1}}
+        found = {"site": "s", "verdict": "unique", "reason": "it fits", "scan": 1}
+        return httpx.Response(200, json=found | {"hypotheses": [best]})
+
+    fake.routes["POST", "/v1/sites/s/localize"] = answer
+    result = run("localize", ("s", [scan(0), scan(1)]), {})
+    assert (result.verdict, result.scan, result.hypotheses[0].x) == ("unique", 1, 1.5)
+
+
 def test_the_mount_is_put(run: Run, fake: FakeService) -> None:
     def answer(request: httpx.Request) -> httpx.Response:
         assert json.loads(request.content)["mount"]["theta"] == 0.5

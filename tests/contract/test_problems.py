@@ -116,6 +116,7 @@ async def test_the_openapi_document_names_every_route_body_and_error(
         "/v1/sites/{site}/graph": {"get"},
         "/v1/sites/{site}/constraints": {"get"},
         "/v1/sites/{site}/constraints/{constraint}": {"get"},
+        "/v1/sites/{site}/localize": {"post"},
         "/v1/match": {"post"},
         "/healthz": {"get"},
         "/readyz": {"get"},

@@ -26,6 +26,8 @@ from lineloom.wire import (
     ConstraintPage,
     Graph,
     IngestAnswer,
+    LocalizeAnswer,
+    LocalizeRequest,
     MapAnswer,
     MatchAnswer,
     MatchRequest,
@@ -201,6 +203,18 @@ def match(reference: ScanLike, current: ScanLike) -> Call[MatchAnswer]:
     body = request.model_dump_json(exclude_none=True).encode()
     headers = {"Content-Type": JSON}
     return Call("POST", "/v1/match", _model(MatchAnswer), headers=headers, content=body)
+
+
+def localize(site: str, scans: Sequence[ScanLike]) -> Call[LocalizeAnswer]:
+    """POST a run of one robot's scans, to learn where the latest was taken."""
+    request = LocalizeRequest.model_construct(scans=[to_match_scan(scan) for scan in scans])
+    return Call(
+        "POST",
+        f"{_site(site)}/localize",
+        _model(LocalizeAnswer),
+        headers={"Content-Type": JSON},
+        content=request.model_dump_json(exclude_none=True).encode(),
+    )
 
 
 def ready() -> Call[Readiness]:

@@ -22,6 +22,7 @@ from lineloom.wire import (
     ConstraintPage,
     Graph,
     IngestAnswer,
+    LocalizeAnswer,
     MapAnswer,
     MatchAnswer,
     MountSettings,
@@ -207,6 +208,13 @@ class Client:
     def match(self, reference: ScanLike, current: ScanLike) -> MatchAnswer:
         """Return where `current` was taken, seen from `reference`; adds nothing to any map."""
         return self._send(calls.match(reference, current))
+
+    def localize(self, site: str, scans: Sequence[ScanLike]) -> LocalizeAnswer:
+        """Return where the latest of a short run of one robot's scans was taken in a site's map.
+
+        Adds nothing to the map.
+        """
+        return self._send(calls.localize(site, scans))
 
     def events(
         self, site: str, *, last_event_id: str | None = None, until_now: bool = False

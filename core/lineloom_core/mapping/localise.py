@@ -24,9 +24,9 @@ from lineloom_core.mapping.constraint import INDEPENDENT_SHARE, turned
 from lineloom_core.mapping.localisation import (
     Localisation,
     LocalisationVerdict,
-    LocaliseConfig,
     PoseHypothesis,
 )
+from lineloom_core.mapping.localise_config import LocaliseConfig
 from lineloom_core.mapping.localise_score import probability
 from lineloom_core.mapping.query_place import query_place
 from lineloom_core.mapping.site_map import SiteMap

@@ -10,6 +10,7 @@ from lineloom_service.routes import (
     floorplan,
     graph,
     ingest,
+    localize,
     maps,
     match,
     robots,
@@ -31,6 +32,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     graph.router,
     constraints.router,
     events.router,
+    localize.router,
     match.router,
 )
 """What takes a token, where there are tokens; in the order of the documentation."""

@@ -31,6 +31,12 @@ from lineloom.wire.export import Export, ExportList, ExportRequest, MapDownload
 from lineloom.wire.floorplan import FloorPlanAnswer, Placement, PlanDifferences, PlanPiece
 from lineloom.wire.graph import Graph, GraphEdge, GraphNode, GraphSummary
 from lineloom.wire.ingest import IngestAnswer, RejectedScan, ScanBatch
+from lineloom.wire.localize import (
+    MAX_RUN,
+    LocalizeAnswer,
+    LocalizeHypothesis,
+    LocalizeRequest,
+)
 from lineloom.wire.map import Line, MapAnswer, MapChanges, MapComponent
 from lineloom.wire.match import Alternative, LinePair, MatchAnswer, MatchRequest, MatchScan
 from lineloom.wire.packing import JSON, MSGPACK, pack_json, pack_msgpack
@@ -49,6 +55,7 @@ __all__ = [
     "MAX_BATCH",
     "MAX_BEAMS",
     "MAX_BODY_BYTES",
+    "MAX_RUN",
     "MSGPACK",
     "Alternative",
     "Answer",
@@ -76,6 +83,9 @@ __all__ = [
     "IngestAnswer",
     "Line",
     "LinePair",
+    "LocalizeAnswer",
+    "LocalizeHypothesis",
+    "LocalizeRequest",
     "MapAnswer",
     "MapChanges",
     "MapComponent",
