@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
@@ -16,7 +16,6 @@ from lineloom_service.store.records import BacklogFullError, StoreError
 
 PROBLEM_JSON = "application/problem+json"
 
-_LOG = logging.getLogger(__name__)
 _MAX_FIELD_ERRORS = 100
 
 
@@ -127,42 +126,47 @@ def install(app: FastAPI) -> None:
     """Answer every error as a problem."""
 
     @app.exception_handler(ProblemError)
-    async def _problem(_: Request, error: ProblemError) -> Response:
-        return problem_response(
-            error.kind, error.detail, errors=error.errors, headers=error.headers
+    async def _problem(request: Request, error: ProblemError) -> Response:
+        return _counted(
+            request, error.kind, error.detail, errors=error.errors, headers=error.headers
         )
 
     @app.exception_handler(RequestValidationError)
-    async def _parameter(_: Request, error: RequestValidationError) -> Response:
+    async def _parameter(request: Request, error: RequestValidationError) -> Response:
         # Once each: several dependencies may ask for the same parameter.
         faults = {_describe_parameter(fault["loc"], fault["msg"]): 0 for fault in error.errors()}
-        return problem_response(INVALID_PARAMETER, "; ".join(faults))
+        return _counted(request, INVALID_PARAMETER, "; ".join(faults))
 
     @app.exception_handler(HTTPException)
     async def _http(request: Request, error: HTTPException) -> Response:
         path, method = request.url.path, request.method
         if error.status_code == NOT_FOUND.status:
-            return problem_response(NOT_FOUND, f"{path} is not an address of this service")
+            return _counted(request, NOT_FOUND, f"{path} is not an address of this service")
         if error.status_code == METHOD_NOT_ALLOWED.status:
             detail = f"{path} does not answer {method}"
-            return problem_response(METHOD_NOT_ALLOWED, detail, headers=error.headers)
-        return problem_response(
-            _OTHER, str(error.detail), status=error.status_code, headers=error.headers
+            return _counted(request, METHOD_NOT_ALLOWED, detail, headers=error.headers)
+        return _counted(
+            request, _OTHER, str(error.detail), status=error.status_code, headers=error.headers
         )
 
     @app.exception_handler(BacklogFullError)
-    async def _backlog(_: Request, error: BacklogFullError) -> Response:
+    async def _backlog(request: Request, error: BacklogFullError) -> Response:
         detail = f"{error}; nothing of this request was taken, send it again later"
-        return problem_response(BACKLOG_FULL, detail, headers={"Retry-After": "2"})
+        return _counted(request, BACKLOG_FULL, detail, headers={"Retry-After": "2"})
 
     @app.exception_handler(StoreError)
-    async def _storage(_: Request, error: StoreError) -> Response:
-        return problem_response(STORAGE, str(error), headers={"Retry-After": "5"})
+    async def _storage(request: Request, error: StoreError) -> Response:
+        return _counted(request, STORAGE, str(error), headers={"Retry-After": "5"})
 
-    @app.exception_handler(Exception)
-    async def _internal(request: Request, error: Exception) -> Response:
-        _LOG.error("%s %s failed", request.method, request.url.path, exc_info=error)
-        return problem_response(INTERNAL, "an unexpected error; the service's log has the details")
+
+def internal_problem() -> Response:
+    """Return the answer to whatever nobody foresaw; the log has the rest."""
+    return problem_response(INTERNAL, "an unexpected error; the service's log has the details")
+
+
+def _counted(request: Request, kind: Kind, detail: str, **more: Any) -> Response:
+    request.app.state.service.metrics.count_problem(kind.slug)
+    return problem_response(kind, detail, **more)
 
 
 def _describe_parameter(loc: Sequence[str | int], message: str) -> str:

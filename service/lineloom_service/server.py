@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 import socket
 import sys
 
@@ -11,6 +10,7 @@ import uvicorn
 import uvloop
 
 from lineloom_service.app import create_app
+from lineloom_service.observation import log
 from lineloom_service.security.guard import UnprotectedError
 from lineloom_service.service import Service
 from lineloom_service.settings import Settings
@@ -21,14 +21,7 @@ _SHUTDOWN_S = 5
 
 def run(settings: Settings) -> None:
     """Serve until SIGINT or SIGTERM. Exits with a message where it cannot even start."""
-    logging.basicConfig(
-        level=settings.log_level.upper(),
-        format="%(asctime)s %(levelname)s %(name)s: %(message)s",
-        stream=sys.stderr,
-    )
-    # Every request to stderr costs more than the request.
-    for noisy in ("alembic", "uvicorn.access"):
-        logging.getLogger(noisy).setLevel(logging.WARNING)
+    log.configure(settings.log_level, settings.log_format)
     try:
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
             runner.run(_serve(settings))
@@ -49,7 +42,7 @@ async def _serve(settings: Settings) -> None:
             port=settings.port,
             log_config=None,
             proxy_headers=False,
-            access_log=settings.log_level == "debug",
+            access_log=False,
             timeout_graceful_shutdown=_SHUTDOWN_S,
             server_header=False,
             ssl_certfile=settings.ssl_certfile,

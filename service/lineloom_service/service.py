@@ -15,10 +15,13 @@ from lineloom_service.events.recorder import EventRecorder
 from lineloom_service.floorplans import FloorPlans
 from lineloom_service.maps.map_store import MapStore
 from lineloom_service.matching import PairMatcher
+from lineloom_service.observation.latency import Latency
+from lineloom_service.observation.metrics import Metrics, SiteFigures
 from lineloom_service.security.guard import Guard
 from lineloom_service.settings import Settings
 from lineloom_service.store.choice import database_at
 from lineloom_service.store.protocol import NewsKind, Store
+from lineloom_service.store.records import SiteRecord
 from lineloom_service.store.sql_store import SqlStore
 
 _LOG = logging.getLogger(__name__)
@@ -40,7 +43,6 @@ class Service:
             settings.workers, publish_every_s=settings.publish_every_s
         )
         self.events = EventHub()
-        self.event_streams = 0
         recorder = EventRecorder(
             self.store, self.events, lineloom_core.__version__, settings.event_history
         )
@@ -50,6 +52,12 @@ class Service:
         self.matcher = PairMatcher()
         self.floorplans = FloorPlans(self.store)
         self.guard = Guard(self.store.tokens)
+        self.metrics = Metrics()
+        self._latency = Latency()
+        self._sites_seen: list[SiteRecord] = []
+        self.metrics.watch(
+            self.site_figures, self.engine.durations, self._latency.histogram, self.not_ready
+        )
         self._warming: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
@@ -63,6 +71,8 @@ class Service:
         except BaseException:
             await self.store.close()
             raise
+        self.store.subscribe(self._latency.on_commit)
+        self.engine.subscribe(self._latency.on_view)
         await self.conductor.start()
         self._warming = asyncio.create_task(self.matcher.warm_up())
         self._warming.add_done_callback(_report_failure)
@@ -79,6 +89,23 @@ class Service:
     def _on_news(self, kind: NewsKind, key: str) -> None:
         if kind == "events":
             self.events.wake(int(key))
+
+    async def look_around(self) -> None:
+        """Find out which sites there are, for the figures."""
+        self._sites_seen = await self.store.sites()
+
+    def site_figures(self) -> list[SiteFigures]:
+        """Return how every site is doing."""
+        return [
+            SiteFigures(
+                record.name,
+                max(0, record.position - published.position),
+                record.held,
+                published.view,
+            )
+            for record in self._sites_seen
+            for published in [self.conductor.published(record.id)]
+        ]
 
     def not_ready(self) -> list[str]:
         """Return why the service is not ready; empty when it is."""

@@ -79,7 +79,8 @@ def test_tls_a_token_and_a_log_without_it(tmp_path: Path) -> None:
         bad = {"Authorization": f"Bearer {token}x"}
         assert client.get("/v1/sites", headers=bad).status_code == 401
     log = (tmp_path / "log").read_text()
-    assert "Uvicorn running" in log
+    assert "GET /v1/sites 401" in log
+    assert "GET /v1/sites 200" in log  # at this level
     assert token.split("_", 2)[2] not in log
     assert "Bearer" not in log
 

@@ -27,6 +27,7 @@ from lineloom_core.geometry import Pose
 from lineloom_core.geometry.angles import wrap
 from lineloom_core.graph.components import Components
 from lineloom_core.graph.edge import Edge, chi_squared, square_roots
+from lineloom_core.timing import timed
 
 CAUCHY_K = 3.0
 """Whitened error at which a robust edge has lost half of its weight."""
@@ -52,6 +53,7 @@ class Solution:
     iterations: int
 
 
+@timed("optimise")
 def optimize(
     nodes: Mapping[int, Pose], edges: Sequence[Edge], anchors: Sequence[int] = ()
 ) -> Solution:

@@ -29,6 +29,7 @@ from lineloom_core.geometry import Pose
 from lineloom_core.graph import observe, project_out_weak
 from lineloom_core.matching.free_space import judge_sweeps
 from lineloom_core.matching.local_map import Cloud, LocalMap, Registration
+from lineloom_core.timing import timed
 
 Status = Literal["first", "tracked", "skipped", "lost"]
 
@@ -99,6 +100,7 @@ class Tracker:
         if self._recent:
             self._map = LocalMap.build(reversed(self._recent))
 
+    @timed("track")
     def track(
         self, features: ScanFeatures, cloud: Cloud, stamp: float, odometry: Pose | None = None
     ) -> Tracked:

@@ -18,6 +18,7 @@ from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
 from lineloom_core.matching.local_map import Registration
 from lineloom_core.places import _kernels
 from lineloom_core.places.place import Place, count_points
+from lineloom_core.timing import timed
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +71,7 @@ NOTHING_IN_COMMON = Recognition(False, None, np.zeros((3, 3)), "too little in co
 """The outcome for most pairs: no hypothesis at all."""
 
 
+@timed("match")
 def recognise(
     reference: Place, current: Place, config: RecognitionConfig | None = None
 ) -> Recognition:

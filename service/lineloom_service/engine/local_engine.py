@@ -23,6 +23,7 @@ from lineloom_service.engine.messages import (
     StartSite,
     StopSite,
     TakeSnapshot,
+    Timed,
     View,
 )
 from lineloom_service.engine.protocol import (
@@ -33,6 +34,7 @@ from lineloom_service.engine.protocol import (
     WorkerDiedError,
 )
 from lineloom_service.engine.worker_process import WorkerProcess
+from lineloom_service.observation.durations import Durations
 from lineloom_service.store.records import LogEntry
 
 _LOG = logging.getLogger(__name__)
@@ -85,6 +87,7 @@ class LocalEngine:
         self._slots = [_Slot(number) for number in range(workers)]
         self._sites: dict[int, _Site] = {}
         self._listeners: list[ViewListener] = []
+        self._durations = Durations()
         self._stopping = False
 
     @property
@@ -123,6 +126,10 @@ class LocalEngine:
             for slot in self._slots
             if not slot.ready.is_set()
         ]
+
+    def durations(self) -> Durations:
+        """Return how long the workers' stages took so far."""
+        return self._durations
 
     async def start_site(self, site: int, position: int, snapshot: bytes | None) -> None:
         """Host a site on the worker that has fewest, or on the one that has it already."""
@@ -206,6 +213,9 @@ class LocalEngine:
         if isinstance(report, Ready):
             slot.stillborn = 0
             slot.ready.set()
+            return
+        if isinstance(report, Timed):
+            self._durations.add(report.durations)
             return
         hosted = self._sites.get(report.site)
         if hosted is None or hosted.run != report.run:

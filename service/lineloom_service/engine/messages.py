@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from lineloom_core.mapping.site_view import SiteView
 
+from lineloom_service.observation.durations import Durations
 from lineloom_service.store.records import LogEntry
 
 
@@ -124,4 +125,11 @@ class Failed:
     reason: str
 
 
-Report = Ready | Started | Fed | View | Snapshot | Answered | Failed
+@dataclass(frozen=True, slots=True)
+class Timed:
+    """How long the worker's stages took since it last said so."""
+
+    durations: Durations
+
+
+Report = Timed | Ready | Started | Fed | View | Snapshot | Answered | Failed

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 
 from lineloom_core.mapping.site_view import SiteView
 
+from lineloom_service.observation.durations import Durations
 from lineloom_service.store.records import LogEntry
 
 ViewListener = Callable[[int, int, SiteView], None]
@@ -64,6 +65,10 @@ class Engine(Protocol):
 
     def not_ready(self) -> list[str]:
         """Return what is missing before mappers can run; empty when nothing is."""
+        ...
+
+    def durations(self) -> Durations:
+        """Return how long the mappers' stages took so far."""
         ...
 
     async def start_site(self, site: int, position: int, snapshot: bytes | None) -> None:

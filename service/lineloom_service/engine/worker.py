@@ -12,6 +12,8 @@ import zlib
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
+from lineloom_core import timing
+
 from lineloom_service.engine.current_entry import RESTORING, CurrentEntry
 from lineloom_service.engine.mapper import QUESTIONS, Mapper, MapperFactory, apply, load
 from lineloom_service.engine.messages import (
@@ -28,8 +30,11 @@ from lineloom_service.engine.messages import (
     StartSite,
     StopSite,
     TakeSnapshot,
+    Timed,
     View,
 )
+from lineloom_service.observation.durations import Durations
+from lineloom_service.observation.log import configure_from_environment
 
 _LOG = logging.getLogger(__name__)
 
@@ -69,6 +74,8 @@ class Worker:
         self._factory = factory
         self._publish_every_s = publish_every_s
         self._sites: dict[int, _Hosted] = {}
+        self._durations = Durations()
+        timing.listen(self._durations.observe)
 
     def serve(self) -> None:
         """Take orders, and publish what is due between them."""
@@ -121,6 +128,7 @@ class Worker:
             return
         for entry in order.entries:
             self._current.mark(order.site, entry.position)
+            begin = time.perf_counter()
             try:
                 apply(hosted.mapper, entry)
             except Exception as error:
@@ -131,6 +139,7 @@ class Worker:
                 return
             finally:
                 self._current.clear()
+            self._durations.observe("entry", time.perf_counter() - begin)
         hosted.position = order.through
         pause = _CAUGHT_UP_PAUSE_S if order.caught_up else self._publish_every_s
         hosted.due = hosted.earliest + max(pause, hosted.pause)
@@ -144,7 +153,9 @@ class Worker:
             return
         try:
             # Four times smaller at the quickest level.
+            begin = time.perf_counter()
             data = zlib.compress(hosted.mapper.snapshot(), 1)
+            self._durations.observe("snapshot", time.perf_counter() - begin)
         except Exception as error:
             _LOG.exception("site %d: no snapshot", order.site)
             del self._sites[order.site]
@@ -190,6 +201,8 @@ class Worker:
             self._connection.send(View(site, hosted.run, hosted.position, view))
         hosted.earliest = time.monotonic()
         hosted.pause = (hosted.earliest - started) / _PUBLISHING_SHARE
+        self._durations.observe("view", hosted.earliest - started)
+        self._connection.send(Timed(self._durations.take()))
 
 
 def describe(error: BaseException) -> str:
@@ -211,6 +224,7 @@ def run_worker(
     threading.Thread(target=_end_with_service, args=(life,), daemon=True).start()
     with contextlib.suppress(OSError):
         os.nice(_NICENESS)  # answers go before mapping
+    configure_from_environment()
     factory = load(mapper)
     if warm_up is not None:
         load(warm_up)()

@@ -25,6 +25,7 @@ class EventHub:
     def __init__(self) -> None:
         self._channels: dict[int, _Channel] = {}
         self._closed: set[int] = set()
+        self.listeners = 0
         self.stopping = False
 
     def add(self, site_id: int, number: int, events: Sequence[Told]) -> None:

@@ -13,6 +13,7 @@ from lineloom_service.routes import (
     localize,
     maps,
     match,
+    metrics,
     robots,
     sites,
     status,
@@ -34,6 +35,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     events.router,
     localize.router,
     match.router,
+    metrics.router,
 )
 """What takes a token, where there are tokens; in the order of the documentation."""
 

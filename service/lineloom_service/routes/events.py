@@ -40,8 +40,8 @@ async def get_events(
     Without `Last-Event-ID` it begins with what happens from now on.
     """
     settings = service.settings
-    if service.event_streams >= settings.event_streams:
-        detail = f"{service.event_streams} listeners are connected, more are not taken"
+    if service.events.listeners >= settings.event_streams:
+        detail = f"{service.events.listeners} listeners are connected, more are not taken"
         raise ProblemError(TOO_MANY_STREAMS, detail, headers={"Retry-After": "10"})
     feed = EventFeed(service.store, service.events, site.id, poll_s=None)
     first = await feed.start(last_event_id, view.version)
@@ -56,7 +56,8 @@ async def _counted(
     first: Message,
     following: AsyncGenerator[Message | None],
 ) -> AsyncGenerator[Message | None]:
-    service.event_streams += 1
+    service.events.listeners += 1
+    service.metrics.listeners.set(service.events.listeners)
     try:
         yield first
         async with contextlib.aclosing(following):
@@ -65,4 +66,5 @@ async def _counted(
                     return
                 yield message
     finally:
-        service.event_streams -= 1
+        service.events.listeners -= 1
+        service.metrics.listeners.set(service.events.listeners)
