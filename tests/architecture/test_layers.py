@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -20,6 +22,16 @@ type = "forbidden"
 source_modules = ["lineloom_core.matching"]
 forbidden_modules = ["lineloom_core.features"]
 """
+
+
+@pytest.fixture(autouse=True)
+def _loggers_as_before() -> Iterator[None]:
+    """The linter's set-up of logging disables every logger that there is."""
+    known = logging.Logger.manager.loggerDict.values()
+    before = [(log, log.disabled) for log in known if isinstance(log, logging.Logger)]
+    yield
+    for log, disabled in before:
+        log.disabled = disabled
 
 
 def test_no_import_breaks_a_contract(

@@ -198,11 +198,11 @@ class Worker:
             # The site stays at its last view, and is not idle: that is the truth.
             _LOG.exception("site %d: no view after entry %d", site, hosted.position)
         else:
+            self._durations.observe("view", time.monotonic() - started)
+            self._connection.send(Timed(self._durations.take()))
             self._connection.send(View(site, hosted.run, hosted.position, view))
         hosted.earliest = time.monotonic()
         hosted.pause = (hosted.earliest - started) / _PUBLISHING_SHARE
-        self._durations.observe("view", hosted.earliest - started)
-        self._connection.send(Timed(self._durations.take()))
 
 
 def describe(error: BaseException) -> str:
