@@ -117,6 +117,12 @@ def served(service: FakeService) -> tuple[ThreadingHTTPServer, str]:
         def do_GET(self) -> None:
             self._answer()
 
+        def do_PUT(self) -> None:
+            self._answer()
+
+        def do_DELETE(self) -> None:
+            self._answer()
+
         def do_POST(self) -> None:
             self._answer()
 
@@ -126,7 +132,8 @@ def served(service: FakeService) -> tuple[ThreadingHTTPServer, str]:
             request.headers.update(dict(self.headers))
             answer = service(request)
             self.send_response(answer.status_code)
-            self.send_header("Content-Type", "application/json")
+            kind = answer.headers.get("Content-Type", "application/json")
+            self.send_header("Content-Type", kind)
             self.send_header("Content-Length", str(len(answer.content)))
             self.end_headers()
             self.wfile.write(answer.content)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from lineloom import Client
 from lineloom.cli.child_service import ChildService
-from lineloom.cli.replay import load
+from lineloom.cli.recordings import load
 
 from tests.scenarios.real_logs import CSAIL, FR079, RealLog
 

@@ -29,6 +29,8 @@ from lineloom.wire import (
     LocalizeAnswer,
     LocalizeRequest,
     MapAnswer,
+    MapFormat,
+    MapFrame,
     MatchAnswer,
     MatchRequest,
     MountSettings,
@@ -48,12 +50,22 @@ from lineloom.wire import (
 )
 
 Encoding = Literal["json", "msgpack"]
-MapFormat = Literal["json", "geojson", "svg", "png", "dxf", "nav2"]
 Box = tuple[float, float, float, float]
 
 _COMPRESS_FROM_BYTES = 1024
 _T = TypeVar("_T")
 _ModelT = TypeVar("_ModelT", bound=BaseModel)
+
+
+@dataclass(frozen=True)
+class MapOptions:
+    """What of a map, and how it lies: as in `wire.ExportRequest`."""
+
+    component: str | None = None
+    bbox: Box | None = None
+    align: bool = False
+    frame: MapFrame = "map"
+    resolution: float | None = None
 
 
 @dataclass(frozen=True)
@@ -80,7 +92,7 @@ def post_scans(
         body = gzip.compress(body, compresslevel=1, mtime=0)
         headers["Content-Encoding"] = "gzip"
     path = f"{_robot(site, robot)}/scans"
-    return Call("POST", path, _model(IngestAnswer), headers=headers, content=body)
+    return Call("POST", path, read_model(IngestAnswer), headers=headers, content=body)
 
 
 def put_mount(site: str, robot: str, mount: MountSettings) -> Call[Robot]:
@@ -89,7 +101,7 @@ def put_mount(site: str, robot: str, mount: MountSettings) -> Call[Robot]:
     return Call(
         "PUT",
         _robot(site, robot),
-        _model(Robot),
+        read_model(Robot),
         headers={"Content-Type": JSON},
         content=body,
     )
@@ -97,27 +109,27 @@ def put_mount(site: str, robot: str, mount: MountSettings) -> Call[Robot]:
 
 def sites() -> Call[SiteList]:
     """GET all sites."""
-    return Call("GET", "/v1/sites", _model(SiteList))
+    return Call("GET", "/v1/sites", read_model(SiteList))
 
 
 def site(name: str) -> Call[Site]:
     """GET how a site is doing."""
-    return Call("GET", _site(name), _model(Site))
+    return Call("GET", site_path(name), read_model(Site))
 
 
 def robots(site: str) -> Call[RobotList]:
     """GET the robots of a site."""
-    return Call("GET", f"{_site(site)}/robots", _model(RobotList))
+    return Call("GET", f"{site_path(site)}/robots", read_model(RobotList))
 
 
 def robot(site: str, name: str) -> Call[Robot]:
     """GET one robot."""
-    return Call("GET", _robot(site, name), _model(Robot))
+    return Call("GET", _robot(site, name), read_model(Robot))
 
 
 def trajectory(site: str, robot: str) -> Call[Trajectory]:
     """GET every processed scan's pose."""
-    return Call("GET", f"{_robot(site, robot)}/trajectory", _model(Trajectory))
+    return Call("GET", f"{_robot(site, robot)}/trajectory", read_model(Trajectory))
 
 
 def trajectory_text(site: str, robot: str, format: Literal["tum", "csv"]) -> Call[str]:
@@ -127,8 +139,8 @@ def trajectory_text(site: str, robot: str, format: Literal["tum", "csv"]) -> Cal
 
 def transform(site: str, robot_a: str, robot_b: str) -> Call[Transform]:
     """GET T_a_b."""
-    path = f"{_site(site)}/transforms/{_name(robot_a)}/{_name(robot_b)}"
-    return Call("GET", path, _model(Transform))
+    path = f"{site_path(site)}/transforms/{url_name(robot_a)}/{url_name(robot_b)}"
+    return Call("GET", path, read_model(Transform))
 
 
 def map_lines(
@@ -138,23 +150,29 @@ def map_lines(
     params = _map_params("json", component, bbox)
     if since is not None:
         params["since"] = str(since)
-    return Call("GET", f"{_site(site)}/map", _model(MapAnswer), params=params)
+    return Call("GET", f"{site_path(site)}/map", read_model(MapAnswer), params=params)
 
 
-def map_file(site: str, format: MapFormat, component: str | None, bbox: Box | None) -> Call[bytes]:
+def map_file(site: str, format: MapFormat, options: MapOptions) -> Call[bytes]:
     """GET the map as a file."""
-    params = _map_params(format, component, bbox)
-    return Call("GET", f"{_site(site)}/map", _bytes, params=params)
+    params = _map_params(format, options.component, options.bbox)
+    if options.align:
+        params["align"] = "true"
+    if options.frame != "map":
+        params["frame"] = options.frame
+    if options.resolution is not None:
+        params["resolution"] = repr(float(options.resolution))
+    return Call("GET", f"{site_path(site)}/map", read_bytes, params=params)
 
 
 def graph(site: str) -> Call[Graph]:
     """GET the pose graph."""
-    return Call("GET", f"{_site(site)}/graph", _model(Graph))
+    return Call("GET", f"{site_path(site)}/graph", read_model(Graph))
 
 
 def graph_g2o(site: str) -> Call[str]:
     """GET the pose graph as g2o text."""
-    return Call("GET", f"{_site(site)}/graph", _text, params={"format": "g2o"})
+    return Call("GET", f"{site_path(site)}/graph", _text, params={"format": "g2o"})
 
 
 def constraints(
@@ -163,19 +181,19 @@ def constraints(
     """GET a page of constraints."""
     wanted = {"kind": kind, "state": state, "limit": limit, "cursor": cursor}
     params = {name: str(value) for name, value in wanted.items() if value is not None}
-    return Call("GET", f"{_site(site)}/constraints", _model(ConstraintPage), params=params)
+    return Call("GET", f"{site_path(site)}/constraints", read_model(ConstraintPage), params=params)
 
 
 def events(site: str, follow: bool) -> Call[None]:
     """GET the stream of a site's events; `event_stream` reads it."""
     headers = {"Accept": "text/event-stream", "Cache-Control": "no-store"}
     params = {} if follow else {"follow": "false"}
-    return Call("GET", f"{_site(site)}/events", lambda _: None, params=params, headers=headers)
+    return Call("GET", f"{site_path(site)}/events", lambda _: None, params=params, headers=headers)
 
 
 def constraint(site: str, constraint_id: str) -> Call[ConstraintDetail]:
     """GET one constraint with its evidence."""
-    return Call("GET", _constraint(site, constraint_id), _model(ConstraintDetail))
+    return Call("GET", _constraint(site, constraint_id), read_model(ConstraintDetail))
 
 
 def constraint_svg(site: str, constraint_id: str) -> Call[str]:
@@ -187,12 +205,12 @@ def act_on_constraint(
     site: str, constraint_id: str, action: Literal["retract", "restore"]
 ) -> Call[Constraint]:
     """POST that a constraint is to be retracted, or restored."""
-    return Call("POST", f"{_constraint(site, constraint_id)}/{action}", _model(Constraint))
+    return Call("POST", f"{_constraint(site, constraint_id)}/{action}", read_model(Constraint))
 
 
 def what_if(site: str, constraint_id: str) -> Call[WhatIf]:
     """POST the question what retracting (or restoring) a constraint would do."""
-    return Call("POST", f"{_constraint(site, constraint_id)}/what-if", _model(WhatIf))
+    return Call("POST", f"{_constraint(site, constraint_id)}/what-if", read_model(WhatIf))
 
 
 def match(reference: ScanLike, current: ScanLike) -> Call[MatchAnswer]:
@@ -202,7 +220,7 @@ def match(reference: ScanLike, current: ScanLike) -> Call[MatchAnswer]:
     )
     body = request.model_dump_json(exclude_none=True).encode()
     headers = {"Content-Type": JSON}
-    return Call("POST", "/v1/match", _model(MatchAnswer), headers=headers, content=body)
+    return Call("POST", "/v1/match", read_model(MatchAnswer), headers=headers, content=body)
 
 
 def localize(site: str, scans: Sequence[ScanLike]) -> Call[LocalizeAnswer]:
@@ -256,7 +274,9 @@ def raise_for_problem(response: httpx.Response) -> None:
     raise problem_error(problem, retry_after(response))
 
 
-def _model(kind: type[_ModelT]) -> Callable[[httpx.Response], _ModelT]:
+def read_model(kind: type[_ModelT]) -> Callable[[httpx.Response], _ModelT]:
+    """Return a reader of a model's JSON."""
+
     def read(response: httpx.Response) -> _ModelT:
         raise_for_problem(response)
         try:
@@ -277,7 +297,13 @@ def _text(response: httpx.Response) -> str:
     return response.text
 
 
-def _bytes(response: httpx.Response) -> bytes:
+def read_nothing(response: httpx.Response) -> None:
+    """Read an answer that says nothing more."""
+    raise_for_problem(response)
+
+
+def read_bytes(response: httpx.Response) -> bytes:
+    """Read an answer as it came."""
     raise_for_problem(response)
     return response.content
 
@@ -291,17 +317,19 @@ def _map_params(format: str, component: str | None, bbox: Box | None) -> dict[st
     return params
 
 
-def _site(name: str) -> str:
-    return f"/v1/sites/{_name(name)}"
+def site_path(name: str) -> str:
+    """Return the path of a site."""
+    return f"/v1/sites/{url_name(name)}"
 
 
 def _constraint(site: str, constraint_id: str) -> str:
-    return f"{_site(site)}/constraints/{_name(constraint_id)}"
+    return f"{site_path(site)}/constraints/{url_name(constraint_id)}"
 
 
 def _robot(site: str, robot: str) -> str:
-    return f"{_site(site)}/robots/{_name(robot)}"
+    return f"{site_path(site)}/robots/{url_name(robot)}"
 
 
-def _name(name: str) -> str:
+def url_name(name: str) -> str:
+    """Return a name as it stands in a path."""
     return quote(name, safe="")

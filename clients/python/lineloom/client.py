@@ -9,8 +9,8 @@ from typing import Literal, Self, TypeVar
 
 import httpx
 
-from lineloom import calls, event_stream
-from lineloom.calls import Box, Call, Encoding, MapFormat
+from lineloom import calls, event_stream, export_calls
+from lineloom.calls import Box, Call, Encoding, MapOptions
 from lineloom.errors import ConnectionFailedError
 from lineloom.retry import RetryPolicy
 from lineloom.scan_like import ScanLike, batches
@@ -20,12 +20,18 @@ from lineloom.wire import (
     Constraint,
     ConstraintDetail,
     ConstraintPage,
+    Export,
+    ExportList,
+    FloorPlanAnswer,
     Graph,
     IngestAnswer,
     LocalizeAnswer,
     MapAnswer,
+    MapFormat,
+    MapFrame,
     MatchAnswer,
     MountSettings,
+    PlanDifferences,
     Readiness,
     Robot,
     RobotList,
@@ -149,9 +155,60 @@ class Client:
         *,
         component: str | None = None,
         bbox: Box | None = None,
+        align: bool = False,
+        frame: MapFrame = "map",
+        resolution: float | None = None,
     ) -> bytes:
-        """Return the map as a file of the format named."""
-        return self._send(calls.map_file(site, format, component, bbox))
+        """Return the map as a file of the format named.
+
+        align: turned so that walls run along the axes. frame: "plan" for the floor plan's
+        coordinates. resolution [m]: of nav2's cells.
+        """
+        options = MapOptions(component, bbox, align, frame, resolution)
+        return self._send(calls.map_file(site, format, options))
+
+    def export(self, site: str, format: MapFormat, options: MapOptions | None = None) -> Export:
+        """Write the map as it is now into a file that stays, and return its address and hash."""
+        return self._send(export_calls.post_export(site, format, options or MapOptions()))
+
+    def exports(self, site: str) -> ExportList:
+        """Return the exports of a site, oldest first."""
+        return self._send(export_calls.exports(site))
+
+    def export_file(self, site: str, export: str) -> bytes:
+        """Return an export's bytes."""
+        return self._send(export_calls.export_file(site, export))
+
+    def delete_export(self, site: str, export: str) -> None:
+        """Remove an export."""
+        self._send(export_calls.delete_export(site, export))
+
+    # Floor plan
+
+    def put_floorplan(self, site: str, content: bytes, media_type: str) -> FloorPlanAnswer:
+        """Send the building's plan, and return where in it the map lies, or why that is open.
+
+        media_type: application/geo+json, image/vnd.dxf, or text/plain for `x1, y1, x2, y2` lines.
+        """
+        return self._send(export_calls.put_floorplan(site, content, media_type))
+
+    def floorplan(self, site: str) -> FloorPlanAnswer:
+        """Return where in the plan each component lies."""
+        return self._send(export_calls.floorplan(site))
+
+    def delete_floorplan(self, site: str) -> None:
+        """Forget the plan."""
+        self._send(export_calls.delete_floorplan(site))
+
+    def floorplan_differences(self, site: str, component: str | None = None) -> PlanDifferences:
+        """Return walls of the plan that are missing, and walls that it does not have."""
+        return self._send(export_calls.floorplan_differences(site, component))
+
+    def floorplan_drawing(
+        self, site: str, format: Literal["svg", "png"] = "svg", component: str | None = None
+    ) -> bytes:
+        """Return the differences as a picture."""
+        return self._send(export_calls.floorplan_drawing(site, component, format))
 
     def graph(self, site: str) -> Graph:
         """Return the pose graph."""

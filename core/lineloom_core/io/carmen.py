@@ -17,10 +17,12 @@ end at +90 degrees, 180 and 360 one step before.
 
 from __future__ import annotations
 
+import gzip
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 
@@ -36,6 +38,7 @@ _FLASER_SWEEPS = {
     360: math.radians(0.5),
     361: math.radians(0.5),
 }
+_GZIP_MAGIC = b"\x1f\x8b"
 _FLASER_TAIL = 9
 _ROBOTLASER_HEAD = 7
 _ROBOTLASER_TAIL = 14
@@ -92,7 +95,7 @@ def read_carmen_records(
     }
     kind: str | None = None
     seq = 0
-    with source.open(encoding="ascii", errors="replace") as lines:
+    with open_text(source) as lines:
         for number, text in enumerate(lines, start=1):
             word = text.split(maxsplit=1)[0] if not text.isspace() else ""
             if word not in parsers or (kind is not None and word != kind):
@@ -109,6 +112,15 @@ def read_carmen_records(
                 raise CarmenError(source, number, f"{word}: {_plain(error)}") from None
             yield CarmenScan(scan, parsed.robot.between(parsed.laser), number)
             seq += 1
+
+
+def open_text(path: Path) -> IO[str]:
+    """Open a log; one that is compressed by gzip is read as it was, whatever its name."""
+    with path.open("rb") as file:
+        compressed = file.read(2) == _GZIP_MAGIC
+    if compressed:
+        return gzip.open(path, "rt", encoding="ascii", errors="replace")
+    return path.open(encoding="ascii", errors="replace")
 
 
 @dataclass(frozen=True, slots=True)

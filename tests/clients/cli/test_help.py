@@ -31,7 +31,11 @@ def test_these_are_the_commands() -> None:
     assert NAMES == [
         "bench",
         "demo",
+        "doctor",
         "experiment",
+        "export",
+        "floorplan",
+        "graph",
         "map",
         "match",
         "replay",
@@ -39,6 +43,7 @@ def test_these_are_the_commands() -> None:
         "simulate",
         "status",
         "token",
+        "trajectory",
     ]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import httpx
 import pytest
 from lineloom import Client
@@ -23,7 +25,10 @@ def site(processed: int, merged: dict[str, str]) -> Site:
         robots=["a", "b", "c"],
         components=[Component(id=name, robots=["a", "b"], keyframes=3) for name in sorted(left)],
         merged_into=merged,
-        constraints={},
+        constraints={
+            "sequential": {"accepted": 9},
+            "rendezvous": {"accepted": 3 - len(left), "rejected": 4},
+        },
     )
 
 
@@ -41,11 +46,11 @@ def test_merges_and_progress_are_told(
         shown.on_site(site(60, {"c9": "c1", "c2": "c1"}))
         shown.on_site(site(70, {"c9": "c1", "c2": "c1"}))
     told = capsys.readouterr().err.splitlines()
-    assert told == [
-        "sent 0 of 90, mapped 30, 3 components",
+    assert [re.sub(r"\d+ scans/s", "N scans/s", line) for line in told] == [
+        "sent 0 of 90, mapped 30, N scans/s, 3 components, 0 constraints, 50 pending",
         "component c2 joined c1: a, b (after 50 scans)",
-        "sent 0 of 90, mapped 50, 2 components",
-        "sent 0 of 90, mapped 60, 2 components",
+        "sent 0 of 90, mapped 50, N scans/s, 2 components, 1 constraint, 30 pending",
+        "sent 0 of 90, mapped 60, N scans/s, 2 components, 1 constraint, 20 pending",
     ]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import math
 from pathlib import Path
 
@@ -164,3 +165,14 @@ def test_real_robotlaser_log_has_the_laser_behind_the_centre() -> None:
     assert {len(record.scan) for record in records} == {360}
     offsets = np.array([record.laser_offset.to_array() for record in records])
     np.testing.assert_allclose(offsets, np.tile([-0.04, 0.0, 0.0], (1464, 1)), atol=1e-5)
+
+
+def test_compressed_logs_are_read_whatever_their_name(tmp_path: Path) -> None:
+    plain = write(tmp_path, flaser([2.0] * 181), flaser([3.0] * 181))
+    packed = tmp_path / "packed.clf.gz"
+    packed.write_bytes(gzip.compress(plain.read_bytes()))
+    renamed = tmp_path / "packed.log"
+    renamed.write_bytes(packed.read_bytes())
+    for path in (packed, renamed):
+        scans = list(read_carmen(path))
+        assert [scan.ranges[0] for scan in scans] == [2.0, 3.0]

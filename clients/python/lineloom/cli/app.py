@@ -8,7 +8,22 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from lineloom.cli import bench, demo, experiment, match, replay, serve, simulate, status, token
+from lineloom.cli import (
+    bench,
+    demo,
+    doctor,
+    experiment,
+    export,
+    floorplan,
+    graph,
+    match,
+    replay,
+    serve,
+    simulate,
+    status,
+    token,
+    trajectory,
+)
 from lineloom.cli import map as map_command
 from lineloom.cli.console import note
 from lineloom.cli.failure import EXIT_CODES, explained
@@ -33,7 +48,7 @@ class Commands(TyperGroup):
 app = typer.Typer(
     cls=Commands,
     no_args_is_help=True,
-    add_completion=False,
+    add_completion=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
@@ -74,10 +89,15 @@ app.command("demo")(demo.demo)
 app.command("replay")(replay.replay)
 app.command("simulate")(simulate.simulate)
 app.command("map")(map_command.map_)
+app.command("trajectory")(trajectory.trajectory)
+app.command("graph")(graph.graph)
 app.command("match")(match.match)
 app.command("status")(status.status)
+app.command("doctor")(doctor.doctor)
 app.command("experiment")(experiment.experiment)
 app.add_typer(bench.app, name="bench")
+app.add_typer(export.app, name="export")
+app.add_typer(floorplan.app, name="floorplan")
 app.add_typer(token.app, name="token")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from enum import StrEnum
 from typing import Annotated
 
@@ -10,58 +9,95 @@ import typer
 
 from lineloom.calls import Box
 from lineloom.cli import options
-from lineloom.cli.console import note
+from lineloom.cli.deliver import deliver, refuse_terminal
 from lineloom.cli.failure import CommandError, Exit
 from lineloom.cli.patience import quick
 from lineloom.client import Client
 
 
 class Format(StrEnum):
-    """What the service draws."""
+    """What the service writes."""
 
     JSON = "json"
     GEOJSON = "geojson"
     SVG = "svg"
     PNG = "png"
+    DXF = "dxf"
+    CSV = "csv"
+    IEEE1873 = "ieee1873"
+    NAV2 = "nav2"
+
+
+class Frame(StrEnum):
+    """Coordinates."""
+
+    MAP = "map"
+    PLAN = "plan"
+
+
+SUFFIXES = {Format.PNG: "png", Format.NAV2: "zip"}
+"""Endings of those that are no text."""
+
+FormatOption = Annotated[Format, typer.Option("--format", "-f", help="What kind of file to make.")]
+Component = Annotated[
+    str | None, typer.Option(metavar="ID", help="Only this component; else all of them.")
+]
+BBox = Annotated[
+    str | None,
+    typer.Option(metavar="X1,Y1,X2,Y2", help="Only what lies in this box of the map [m]."),
+]
+Align = Annotated[
+    bool, typer.Option("--align", help="Turn the map so that its walls run along the axes.")
+]
+FrameOption = Annotated[
+    Frame, typer.Option(help="In which coordinates: the map's own, or the floor plan's.")
+]
+Resolution = Annotated[
+    float | None,
+    typer.Option(min=0.001, max=10.0, metavar="METRES", help="Size of a cell of a nav2 map; 0.05."),
+]
 
 
 def map_(
-    format: Annotated[
-        Format, typer.Option("--format", "-f", help="What kind of file to make.")
-    ] = Format.SVG,
+    format: FormatOption = Format.SVG,
     output: options.Output = None,
     site: options.Site = options.DEFAULT_SITE,
-    component: Annotated[
-        str | None, typer.Option(metavar="ID", help="Only this component; else all of them.")
-    ] = None,
-    bbox: Annotated[
-        str | None,
-        typer.Option(metavar="X1,Y1,X2,Y2", help="Only what lies in this box of the map [m]."),
-    ] = None,
+    component: Component = None,
+    bbox: BBox = None,
+    align: Align = False,
+    frame: FrameOption = Frame.MAP,
+    resolution: Resolution = None,
     url: options.Url = None,
     token: options.Token = None,
+    json: options.Json = False,
 ) -> None:
     """Fetch the map of a site.
+
+    --json is --format json. nav2 is a zip of map.pgm and map.yaml, of one component.
 
     \b
     Example:
       lineloom map --site floor-2 --format svg --output map.svg
+      lineloom map --format nav2 --component c0 --output map.zip
     """
-    box = _box(bbox)
-    if output is None and format is Format.PNG and sys.stdout.isatty():
-        raise CommandError("a png is not for the terminal: add --output map.png", Exit.USAGE)
+    chosen = Format.JSON if json else format
+    suffix = SUFFIXES.get(chosen)
+    refuse_terminal(output, binary=suffix is not None, example=f"map.{suffix}")
     with Client(url, token=token, retry=quick()) as client:
-        content = client.map_file(site, format.value, component=component, bbox=box)
-    if output is None:
-        sys.stdout.buffer.write(content)
-        sys.stdout.buffer.flush()
-        return
-    output.parent.mkdir(parents=True, exist_ok=True)
-    output.write_bytes(content)
-    note(f"{output}: {len(content)} bytes")
+        content = client.map_file(
+            site,
+            chosen.value,
+            component=component,
+            bbox=read_box(bbox),
+            align=align,
+            frame=frame.value,
+            resolution=resolution,
+        )
+    deliver(content, output)
 
 
-def _box(text: str | None) -> Box | None:
+def read_box(text: str | None) -> Box | None:
+    """Return the box that an option means, or end the command."""
     if text is None:
         return None
     try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from lineloom.cli.console import print_json
@@ -14,6 +14,7 @@ from lineloom.cli.schedule import Due
 from lineloom.cli.summary import Summary, complain
 from lineloom.cli.watch import Watch
 from lineloom.client import Client
+from lineloom.wire import MountSettings
 
 
 @dataclass(frozen=True)
@@ -27,10 +28,20 @@ class Stage:
     speed: float | None
     timeout: float
 
-    def play(self, scans: Iterable[Due], *, total: int, robots: int, driven_s: float) -> Summary:
-        """Send the scans, wait until they are in the map, and sum up."""
+    def play(
+        self,
+        scans: Iterable[Due],
+        *,
+        total: int,
+        robots: int,
+        driven_s: float,
+        mounts: Mapping[str, MountSettings] | None = None,
+    ) -> Summary:
+        """Send mounts and scans, wait until they are in the map, and sum up."""
         with Client(self.url, token=self.token, retry=patient()) as client:
             require_ready(client)
+            for robot, mount in (mounts or {}).items():
+                client.set_mount(self.site, robot, mount)
             begin = time.monotonic()
             with Watch(client, self.site, total) as watch:
                 player = Player(

@@ -1,4 +1,4 @@
-"""Scans from files: CARMEN logs by way of the core, JSON lines with nothing but the client."""
+"""Scans from files: logs by way of the core, JSON lines with nothing but the client."""
 
 from __future__ import annotations
 
@@ -14,12 +14,14 @@ from lineloom.errors import InvalidScanError
 from lineloom.scan_like import ScanLike, to_match_scan, to_wire
 
 _JSON_SUFFIXES = {".jsonl", ".ndjson", ".json"}
+_TINYSLAM_SUFFIXES = {".dat"}
 _ADDRESSED = re.compile(r"^(?P<path>.+):(?P<line>[0-9]+)$")
 
 
 @dataclass(frozen=True, slots=True)
 class FileScan:
-    """A scan of a file, the line it is on, and whose it is where the file says so."""
+    """A scan of a file, the line it is on (0 where there are no lines), and whose it is where the
+    file says so."""
 
     scan: ScanLike
     line: int
@@ -30,6 +32,8 @@ def read_scans(path: Path) -> Iterator[FileScan]:
     """Yield the scans of a file; its name tells the format. Broken lines end the command."""
     if path.suffix.lower() in _JSON_SUFFIXES:
         return _json_lines(path, for_matching=False)
+    if path.suffix.lower() in _TINYSLAM_SUFFIXES:
+        return _tinyslam(path)
     return _carmen(path)
 
 
@@ -44,7 +48,7 @@ def read_one(reference: str) -> FileScan:
     if path.suffix.lower() == ".json":
         return FileScan(_checked(_whole(path), path, 1, for_matching=True), 1)
     is_json = path.suffix.lower() in _JSON_SUFFIXES
-    scans = _json_lines(path, for_matching=True) if is_json else _carmen(path)
+    scans = _json_lines(path, for_matching=True) if is_json else read_scans(path)
     for found in scans:
         if line is None or found.line == line:
             return found
@@ -102,4 +106,18 @@ def _carmen(path: Path) -> Iterator[FileScan]:
         for record in read_carmen_records(path):
             yield FileScan(record.scan, record.line)
     except CarmenError as error:
+        raise CommandError(str(error)) from None
+
+
+def _tinyslam(path: Path) -> Iterator[FileScan]:
+    try:
+        from lineloom_core.io.tinyslam import TinySlamError, read_tinyslam
+    except ImportError:
+        raise CommandError(
+            f"{path}: reading tinySLAM logs needs the core: `pip install lineloom-client[server]`"
+        ) from None
+    try:
+        for scan in read_tinyslam(path):
+            yield FileScan(scan, scan.seq + 1)
+    except TinySlamError as error:
         raise CommandError(str(error)) from None

@@ -8,17 +8,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from lineloom.scan_like import to_wire
-from lineloom.wire import Scan
+from lineloom.wire import MountSettings, Scan
 
 _NOT_IN_NAMES = re.compile(r"[^A-Za-z0-9._-]+")
 
 
 @dataclass(frozen=True)
 class Stream:
-    """The scans of one robot in their order; stamps as recorded."""
+    """The scans of one robot in their order; stamps as recorded. mount: where the log tells."""
 
     robot: str
     scans: Sequence[Scan]
+    mount: MountSettings | None = None
 
     @property
     def duration(self) -> float:
@@ -54,7 +55,11 @@ def split(stream: Stream, parts: int) -> list[Stream]:
         part = cuts[index]
         session = f"{scan.session}.{index + 1}of{parts}"
         part.append(to_wire(scan, seq=len(part), session=session))
-    return [Stream(f"{stream.robot}-{index + 1}", cut) for index, cut in enumerate(cuts) if cut]
+    return [
+        Stream(f"{stream.robot}-{index + 1}", cut, stream.mount)
+        for index, cut in enumerate(cuts)
+        if cut
+    ]
 
 
 def together(streams: Sequence[Stream]) -> Iterator[Due]:

@@ -31,7 +31,7 @@ class Watch:
         self._already = 0
         self._sent_count = 0
         self._asked_at = 0.0
-        self._told_at = time.monotonic()
+        self._began_at = self._told_at = time.monotonic()
         self._merged: set[str] = set()
         self._progress = Progress(
             TextColumn("{task.description:7}"),
@@ -81,13 +81,26 @@ class Watch:
         """Show the state of the map."""
         self._asked_at = time.monotonic()
         done = max(0, site.scans.processed + site.scans.skipped - self._already)
-        parts = len(site.components)
-        state = f"{parts} component{'' if parts == 1 else 's'}"
+        state = self._state(site, done)
         self._progress.update(self._mapped, completed=done, state=state)
         self._tell_merges(site, done)
         if not err.is_terminal and time.monotonic() - self._told_at >= _LINE_S:
             self._told_at = time.monotonic()
             note(f"sent {self._sent_count} of {self._total}, mapped {done}, {state}")
+
+    def _state(self, site: Site, done: int) -> str:
+        """Say how fast it goes and what has come of it, in one line."""
+        rate = done / max(time.monotonic() - self._began_at, 1e-3)
+        parts = len(site.components)
+        loops = sum(
+            states.get("accepted", 0)
+            for kind, states in site.constraints.items()
+            if kind != "sequential"
+        )
+        return (
+            f"{rate:.0f} scans/s, {parts} component{'' if parts == 1 else 's'}, "
+            f"{loops} constraint{'' if loops == 1 else 's'}, {site.scans.pending} pending"
+        )
 
     def _tell_merges(self, site: Site, done: int) -> None:
         for absorbed, survivor in site.merged_into.items():

@@ -27,7 +27,14 @@ from lineloom.wire.evidence import (
     RunnerUp,
     WhatIf,
 )
-from lineloom.wire.export import Export, ExportList, ExportRequest, MapDownload
+from lineloom.wire.export import (
+    Export,
+    ExportList,
+    ExportRequest,
+    MapDownload,
+    MapFormat,
+    MapFrame,
+)
 from lineloom.wire.floorplan import FloorPlanAnswer, Placement, PlanDifferences, PlanPiece
 from lineloom.wire.graph import Graph, GraphEdge, GraphNode, GraphSummary
 from lineloom.wire.ingest import IngestAnswer, RejectedScan, ScanBatch
@@ -91,6 +98,8 @@ __all__ = [
     "MapComponent",
     "MapDownload",
     "MapEvent",
+    "MapFormat",
+    "MapFrame",
     "MatchAnswer",
     "MatchRequest",
     "MatchScan",

@@ -1,0 +1,46 @@
+"""`lineloom graph`: the pose graph."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
+from lineloom.cli import options
+from lineloom.cli.deliver import deliver
+from lineloom.cli.patience import quick
+from lineloom.client import Client
+
+
+class Format(StrEnum):
+    """What the service writes."""
+
+    JSON = "json"
+    G2O = "g2o"
+
+
+def graph(
+    format: Annotated[
+        Format, typer.Option("--format", "-f", help="What kind of file to make.")
+    ] = Format.G2O,
+    output: options.Output = None,
+    site: options.Site = options.DEFAULT_SITE,
+    url: options.Url = None,
+    token: options.Token = None,
+    json: options.Json = False,
+) -> None:
+    """Fetch the pose graph: keyframes, and constraints with their information.
+
+    g2o is what gtsam and others read; --json is --format json (networkx's node-link).
+
+    \b
+    Example:
+      lineloom graph --site floor-2 --format g2o --output floor-2.g2o
+    """
+    with Client(url, token=token, retry=quick()) as client:
+        if json or format is Format.JSON:
+            text = client.graph(site).model_dump_json()
+        else:
+            text = client.graph_g2o(site)
+    deliver(text.encode(), output)

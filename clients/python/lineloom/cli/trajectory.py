@@ -1,0 +1,50 @@
+"""`lineloom trajectory`: where a robot has been."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
+from lineloom.cli import options
+from lineloom.cli.deliver import deliver
+from lineloom.cli.patience import quick
+from lineloom.client import Client
+
+
+class Format(StrEnum):
+    """What the service writes."""
+
+    JSON = "json"
+    TUM = "tum"
+    CSV = "csv"
+
+
+def trajectory(
+    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="Whose trajectory.")],
+    format: Annotated[
+        Format, typer.Option("--format", "-f", help="What kind of file to make.")
+    ] = Format.TUM,
+    output: options.Output = None,
+    site: options.Site = options.DEFAULT_SITE,
+    url: options.Url = None,
+    token: options.Token = None,
+    json: options.Json = False,
+) -> None:
+    """Fetch the pose of every scan of a robot, as the map has them now.
+
+    tum is what evo and others read. --json is --format json.
+
+    \b
+    Example:
+      lineloom trajectory r1 --site floor-2 --format tum --output r1.tum
+    """
+    with Client(url, token=token, retry=quick()) as client:
+        if json or format is Format.JSON:
+            text = client.trajectory(site, robot).model_dump_json()
+        elif format is Format.TUM:
+            text = client.trajectory_text(site, robot, "tum")
+        else:
+            text = client.trajectory_text(site, robot, "csv")
+    deliver(text.encode(), output)

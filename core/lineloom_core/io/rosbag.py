@@ -1,0 +1,195 @@
+"""Bags of ROS 1 and ROS 2 (SQLite and MCAP), and lone MCAP files, by `rosbags`: ROS not needed.
+
+Every topic of `sensor_msgs/LaserScan` is a robot of its own. Static transforms tell how its lidar
+sits on the base; odometry, where there is any, comes from `nav_msgs/Odometry` of the same
+namespace, else from the transform of the base in the `odom` frame.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rosbags.highlevel import AnyReader, AnyReaderError
+from rosbags.typesys import Stores, get_typestore
+
+from lineloom_core.geometry import Pose
+from lineloom_core.io.odometry_track import OdometryTrack
+from lineloom_core.io.static_transforms import StaticTransforms, planar
+from lineloom_core.scan import InvalidScanError, Mount, Scan
+
+_SCAN = "sensor_msgs/msg/LaserScan"
+_ODOMETRY = "nav_msgs/msg/Odometry"
+_TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+_STATIC_TOPIC = "tf_static"
+
+
+class RosbagError(ValueError):
+    """A bag that cannot be read, or has not what was asked for; the text says what there is."""
+
+
+@dataclass(frozen=True)
+class BagOptions:
+    """topics: of the scans; all there are, if none is named. base_frame, odom_frame: names of
+    frames, also behind a prefix ("r1/base_link"). odometry_topic: for all robots, where their own
+    namespace has none."""
+
+    topics: tuple[str, ...] = ()
+    base_frame: str = "base_link"
+    odom_frame: str = "odom"
+    odometry_topic: str | None = None
+
+
+@dataclass(frozen=True)
+class BagRobot:
+    """One topic's scans in the order of the recording. name: from the topic, "" for "/scan".
+    mount: None where no static transforms tell."""
+
+    topic: str
+    name: str
+    mount: Mount | None
+    scans: tuple[Scan, ...]
+    refused: tuple[str, ...] = ()
+
+
+@dataclass
+class _Gathered:
+    """What one pass over the bag finds."""
+
+    scans: dict[str, list[Any]] = field(default_factory=dict)
+    odometry: dict[str, OdometryTrack] = field(default_factory=dict)
+    static: StaticTransforms = field(default_factory=StaticTransforms)
+    moving: dict[tuple[str, str], OdometryTrack] = field(default_factory=dict)
+
+
+def read_bag(path: str | Path, options: BagOptions | None = None) -> tuple[BagRobot, ...]:
+    """Return the robots of a bag. Raises RosbagError, OSError."""
+    chosen = options or BagOptions()
+    source = Path(path)
+    try:
+        with AnyReader([source], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+            found = _gather(reader, _scan_topics(reader, chosen, source))
+    except AnyReaderError as error:
+        raise RosbagError(f"{source}: not a bag that can be read: {error}") from None
+    return tuple(_robot(topic, found, chosen) for topic in found.scans)
+
+
+def is_bag(path: Path) -> bool:
+    """Tell by its name whether a path is a bag: .bag, .mcap, .db3, or a folder of ROS 2."""
+    if path.is_dir():
+        return (path / "metadata.yaml").exists()
+    return path.suffix.lower() in (".bag", ".mcap", ".db3")
+
+
+def _scan_topics(reader: AnyReader, options: BagOptions, source: Path) -> set[str]:
+    there = sorted({c.topic for c in reader.connections if c.msgtype == _SCAN})
+    others = ", ".join(sorted({f"{c.topic} ({c.msgtype})" for c in reader.connections}))
+    if not there:
+        raise RosbagError(f"{source}: no topic has laser scans; it has: {others or 'nothing'}")
+    missing = [topic for topic in options.topics if topic not in there]
+    if missing:
+        known = ", ".join(there)
+        raise RosbagError(f"{source}: no laser scans on {missing[0]}; they are on: {known}")
+    return set(options.topics or there)
+
+
+def _gather(reader: AnyReader, topics: set[str]) -> _Gathered:
+    found = _Gathered({topic: [] for topic in sorted(topics)})
+    wanted = [
+        c
+        for c in reader.connections
+        if (c.msgtype == _SCAN and c.topic in topics) or c.msgtype in (_ODOMETRY, *_TRANSFORMS)
+    ]
+    for connection, _, raw in reader.messages(connections=wanted):
+        message: Any = reader.deserialize(raw, connection.msgtype)
+        if connection.msgtype == _SCAN:
+            found.scans[connection.topic].append(message)
+        elif connection.msgtype == _ODOMETRY:
+            track = found.odometry.setdefault(connection.topic, OdometryTrack())
+            track.add(_stamp(message), planar(message.pose.pose))
+        else:
+            _take_transforms(found, message, connection.topic.endswith(_STATIC_TOPIC))
+    return found
+
+
+def _take_transforms(found: _Gathered, message: Any, static: bool) -> None:
+    for transform in message.transforms:
+        parent = transform.header.frame_id.lstrip("/")
+        child = transform.child_frame_id.lstrip("/")
+        if static:
+            found.static.add(parent, child, transform.transform)
+        else:
+            track = found.moving.setdefault((parent, child), OdometryTrack())
+            track.add(_stamp(transform), planar(transform.transform))
+
+
+def _robot(topic: str, found: _Gathered, options: BagOptions) -> BagRobot:
+    messages = found.scans[topic]
+    frame = messages[0].header.frame_id.lstrip("/") if messages else ""
+    odometry = _odometry(topic, frame, found, options)
+    scans: list[Scan] = []
+    refused: list[str] = []
+    for number, message in enumerate(messages):
+        stamp = _stamp(message)
+        pose = None if odometry is None else odometry.at(stamp)
+        try:
+            scans.append(_scan(message, stamp, len(scans), pose))
+        except InvalidScanError as error:
+            refused.append(f"{topic}, message {number}: {error}")
+    mount = found.static.mount(options.base_frame, frame)
+    return BagRobot(topic, robot_name(topic), mount, tuple(scans), tuple(refused))
+
+
+def robot_name(topic: str) -> str:
+    """Return a robot's name from its topic: `/r1/scan` is "r1", `/scan` is "" (the file's)."""
+    parts = [part for part in topic.split("/") if part]
+    if parts and parts[-1] in ("scan", "laser_scan", "base_scan"):
+        parts = parts[:-1]
+    return "-".join(parts)
+
+
+def _odometry(
+    topic: str, frame: str, found: _Gathered, options: BagOptions
+) -> OdometryTrack | None:
+    """Return the odometry that belongs to a scan topic, None where it is not plain which."""
+    if options.odometry_topic is not None:
+        return found.odometry.get(options.odometry_topic)
+    space = topic.rsplit("/", 1)[0]
+    own = [t for name, t in found.odometry.items() if name.rsplit("/", 1)[0] == space]
+    if len(own) == 1:
+        return own[0]
+    prefix = frame.rsplit("/", 1)[0] + "/" if "/" in frame else ""
+    return found.moving.get((prefix + options.odom_frame, prefix + options.base_frame))
+
+
+def _scan(message: Any, stamp: float, seq: int, odometry: Pose | None) -> Scan:
+    return Scan.checked(
+        np.asarray(message.ranges, dtype=np.float64),
+        angle_min=float(message.angle_min),
+        angle_increment=_increment(message),
+        range_min=float(message.range_min),
+        range_max=float(message.range_max),
+        stamp=stamp,
+        seq=seq,
+        time_increment=max(0.0, float(message.time_increment)),
+        scan_time=max(0.0, float(message.scan_time)),
+        odometry=odometry,
+    )
+
+
+def _increment(message: Any) -> float:
+    """Return the increment; over a thousand beams its rounding to float32 is felt, so it is taken
+    from both ends where they agree."""
+    beams, told = len(message.ranges), float(message.angle_increment)
+    if beams > 1:
+        between = (float(message.angle_max) - float(message.angle_min)) / (beams - 1)
+        if math.isclose(between, told, rel_tol=1e-4):
+            return between
+    return told
+
+
+def _stamp(message: Any) -> float:
+    return float(message.header.stamp.sec) + 1e-9 * float(message.header.stamp.nanosec)
