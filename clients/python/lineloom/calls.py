@@ -228,8 +228,8 @@ def localize(site: str, scans: Sequence[ScanLike]) -> Call[LocalizeAnswer]:
     request = LocalizeRequest.model_construct(scans=[to_match_scan(scan) for scan in scans])
     return Call(
         "POST",
-        f"{_site(site)}/localize",
-        _model(LocalizeAnswer),
+        f"{site_path(site)}/localize",
+        read_model(LocalizeAnswer),
         headers={"Content-Type": JSON},
         content=request.model_dump_json(exclude_none=True).encode(),
     )
