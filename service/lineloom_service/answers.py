@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from fastapi import Response
+from fastapi import Query, Response
+from fastapi.params import Query as QueryInfo
 from pydantic import BaseModel
 
 from lineloom_service.errors import UNKNOWN_FORMAT, ProblemError
@@ -19,6 +20,14 @@ def answer(
     return Response(
         model.model_dump_json(), status_code=status, headers=dict(headers or {}), media_type=JSON
     )
+
+
+def format_choice(available: Iterable[str]) -> QueryInfo:
+    """Return the description of a query parameter `format`; the route itself checks it."""
+    query: QueryInfo = Query(
+        description="How the answer is written.", json_schema_extra={"enum": list(available)}
+    )
+    return query
 
 
 def unknown_format(wanted: str, available: Iterable[str]) -> ProblemError:

@@ -11,7 +11,7 @@ from fastapi.middleware.cors import CORSMiddleware
 from lineloom_service import __version__, errors, openapi
 from lineloom_service.dependencies import admitted
 from lineloom_service.observation.requests import RequestObserver
-from lineloom_service.routes import OPEN_ROUTERS, ROUTERS, docs
+from lineloom_service.routes import OPEN_ROUTERS, ROUTERS, allowed_methods, docs
 from lineloom_service.security.headers import SecurityHeaders
 from lineloom_service.service import Service
 from lineloom_service.settings import Settings
@@ -55,7 +55,7 @@ def create_app(settings: Settings | None = None, *, service: Service | None = No
     # The last one added is the outermost.
     app.add_middleware(RequestObserver, metrics=served.metrics)
     app.add_middleware(SecurityHeaders)
-    errors.install(app)
+    errors.install(app, allowed_methods)
     openapi.install(app)
     return app
 

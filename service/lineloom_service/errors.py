@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -122,8 +122,8 @@ def pointer(*parts: str | int) -> str:
     return "".join("/" + str(part).replace("~", "~0").replace("/", "~1") for part in parts)
 
 
-def install(app: FastAPI) -> None:
-    """Answer every error as a problem."""
+def install(app: FastAPI, allowed_methods: Callable[[str], Sequence[str]]) -> None:
+    """Answer every error as a problem. allowed_methods: those of an address."""
 
     @app.exception_handler(ProblemError)
     async def _problem(request: Request, error: ProblemError) -> Response:
@@ -144,7 +144,12 @@ def install(app: FastAPI) -> None:
             return _counted(request, NOT_FOUND, f"{path} is not an address of this service")
         if error.status_code == METHOD_NOT_ALLOWED.status:
             detail = f"{path} does not answer {method}"
-            return _counted(request, METHOD_NOT_ALLOWED, detail, headers=error.headers)
+            return _counted(
+                request,
+                METHOD_NOT_ALLOWED,
+                detail,
+                headers={"Allow": ", ".join(allowed_methods(path))},
+            )
         return _counted(
             request, _OTHER, str(error.detail), status=error.status_code, headers=error.headers
         )

@@ -58,12 +58,17 @@ def also_as(*media_types: str) -> dict[int | str, dict[str, Any]]:
 
 def events_of(model: str) -> dict[int | str, dict[str, Any]]:
     """Return the description of a stream whose events' `data` is this model."""
-    schema = {"type": "string", "contentMediaType": "application/json"}
-    description = f"Server-Sent Events; the `data` of each is JSON, see `{model}`."
-    content = {
-        "text/event-stream": {"schema": {**schema, "contentSchema": {"$ref": _SCHEMAS + model}}}
+    data = {
+        "type": "string",
+        "contentMediaType": "application/json",
+        "contentSchema": {"$ref": _SCHEMAS + model},
     }
-    return {200: {"description": description, "content": content}}
+    schema = {
+        "type": "object",
+        "properties": {"event": {"type": "string"}, "id": {"type": "string"}, "data": data},
+    }
+    description = f"Server-Sent Events; the `data` of each is JSON, see `{model}`."
+    return {200: {"description": description, "content": {"text/event-stream": {"schema": schema}}}}
 
 
 def install(app: FastAPI) -> None:

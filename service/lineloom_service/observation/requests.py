@@ -17,6 +17,7 @@ from lineloom_service.observation.metrics import Metrics
 _LOG = logging.getLogger(__name__)
 _ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 _SLOW_S = 1.0
+_PROBES = ("/healthz", "/readyz")
 _NO_ROUTE = "none"
 _STREAM = "text/event-stream"
 
@@ -65,7 +66,9 @@ class RequestObserver:
             self._metrics.observe_request(scope["method"], route, status, seconds)
         slow = seconds > _SLOW_S and not streams
         level = logging.DEBUG
-        if status >= 500 or slow:
+        if route in _PROBES:
+            pass  # asked for every second, and "not yet" is no failure
+        elif status >= 500 or slow:
             level = logging.WARNING
         elif status >= 400:
             level = logging.INFO

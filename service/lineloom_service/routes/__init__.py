@@ -1,6 +1,7 @@
 """The HTTP contract, one file a noun."""
 
 from fastapi import APIRouter
+from fastapi.routing import APIRoute
 
 from lineloom_service.routes import (
     constraints,
@@ -41,3 +42,14 @@ ROUTERS: tuple[APIRouter, ...] = (
 
 OPEN_ROUTERS: tuple[APIRouter, ...] = (status.router, docs.router)
 """What never does: it says nothing about any site."""
+
+
+def allowed_methods(path: str) -> list[str]:
+    """Return the methods that an address answers to: one route has one of them only."""
+    routes = [route for router in (*ROUTERS, *OPEN_ROUTERS) for route in router.routes]
+    return sorted(
+        method
+        for route in routes
+        if isinstance(route, APIRoute) and route.path_regex.match(path)
+        for method in route.methods or ()
+    )

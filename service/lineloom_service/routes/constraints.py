@@ -13,7 +13,7 @@ from lineloom_core.io.svg import to_svg
 from lineloom_core.mapping.answers import Evidence, WhatIf
 from lineloom_core.mapping.site_view import ConstraintView, SiteView
 
-from lineloom_service.answers import answer, unknown_format
+from lineloom_service.answers import answer, format_choice, unknown_format
 from lineloom_service.asking import ask
 from lineloom_service.convert import to_constraint
 from lineloom_service.convert_evidence import to_detail, to_what_if
@@ -23,6 +23,7 @@ from lineloom_service.openapi import also_as
 from lineloom_service.service import Service
 from lineloom_service.store.records import ActionKind, SiteRecord
 
+_FORMATS = ("json", "svg")
 _FOLLOW_S = 20.0
 """How long an action's answer waits for the map."""
 
@@ -62,11 +63,15 @@ async def list_constraints(
     responses=also_as("image/svg+xml"),
 )
 async def get_constraint(
-    site: KnownSite, constraint: str, view: CurrentView, service: ServiceDep, format: str = "json"
+    site: KnownSite,
+    constraint: str,
+    view: CurrentView,
+    service: ServiceDep,
+    format: Annotated[str, format_choice(_FORMATS)] = "json",
 ) -> Response:
     """Return one constraint with its evidence: `format` is json or svg."""
-    if format not in ("json", "svg"):
-        raise unknown_format(format, ("json", "svg"))
+    if format not in _FORMATS:
+        raise unknown_format(format, _FORMATS)
     found = _find(site, view, constraint)
     try:
         evidence: Evidence | None = await ask(service, site, "explain", constraint)

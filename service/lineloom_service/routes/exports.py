@@ -25,7 +25,7 @@ from lineloom_service.errors import (
 )
 from lineloom_service.map_files import FORMATS, render_map
 from lineloom_service.map_frames import in_frame
-from lineloom_service.openapi import body_of
+from lineloom_service.openapi import also_as, body_of
 from lineloom_service.request_body import read_body
 from lineloom_service.service import Service
 from lineloom_service.store.files import FileRecord
@@ -75,7 +75,7 @@ async def list_exports(site: KnownSite, request: Request, service: ServiceDep) -
     "/v1/sites/{site}/exports/{export}",
     name="get_export",
     response_class=Response,
-    responses={200: {"content": {"application/octet-stream": {}}}},
+    responses=also_as(*sorted({form.media_type for form in FORMATS.values()})),
 )
 async def get_export(
     site: KnownSite, export: str, request: Request, service: ServiceDep

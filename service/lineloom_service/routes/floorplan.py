@@ -17,7 +17,7 @@ from lineloom_core.io.png import to_png
 from lineloom_core.io.svg import to_svg
 from lineloom_core.mapping.site_view import SiteView
 
-from lineloom_service.answers import answer, unknown_format
+from lineloom_service.answers import answer, format_choice, unknown_format
 from lineloom_service.dependencies import CurrentView, KnownSite, ServiceDep
 from lineloom_service.errors import (
     INVALID_BODY,
@@ -96,7 +96,7 @@ async def get_differences(
     site: KnownSite,
     view: CurrentView,
     service: ServiceDep,
-    format: str = "json",
+    format: Annotated[str, format_choice(_DIFFERENCES)] = "json",
     component: Annotated[
         str | None, Query(description="Which; the one with a place in the plan if left out.")
     ] = None,

@@ -13,7 +13,7 @@ from lineloom.wire.export import MapFrame
 from lineloom_core.mapping.site_view import SiteView
 
 from lineloom_service import __version__
-from lineloom_service.answers import JSON, matches, unknown_format
+from lineloom_service.answers import JSON, format_choice, matches, unknown_format
 from lineloom_service.dependencies import CurrentView, KnownSite, ServiceDep
 from lineloom_service.errors import INVALID_PARAMETER, UNKNOWN_COMPONENT, ProblemError
 from lineloom_service.map_files import FORMATS, read_bbox, render_map
@@ -39,7 +39,7 @@ async def get_map(
     site: KnownSite,
     view: CurrentView,
     service: ServiceDep,
-    format: str = "json",
+    format: Annotated[str, format_choice(FORMATS)] = "json",
     component: Annotated[str | None, Query(description="Only this component.")] = None,
     bbox: Annotated[str | None, Query(description="x_min,y_min,x_max,y_max in metres.")] = None,
     align: Annotated[bool, Query(description="Turned so that walls run along the axes.")] = False,

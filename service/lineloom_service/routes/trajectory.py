@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from typing import Annotated
 
 import numpy as np
 from fastapi import APIRouter, Response
@@ -10,7 +11,7 @@ from lineloom import wire
 from lineloom_core.io import csv, tum
 from lineloom_core.mapping.site_view import TrajectoryView
 
-from lineloom_service.answers import answer, unknown_format
+from lineloom_service.answers import answer, format_choice, unknown_format
 from lineloom_service.convert import to_trajectory
 from lineloom_service.dependencies import CurrentView, KnownRobot
 from lineloom_service.openapi import also_as
@@ -35,7 +36,11 @@ _TEXT = {
     response_model=wire.Trajectory,
     responses=also_as("text/plain", "text/csv"),
 )
-async def get_trajectory(robot: KnownRobot, view: CurrentView, format: str = "json") -> Response:
+async def get_trajectory(
+    robot: KnownRobot,
+    view: CurrentView,
+    format: Annotated[str, format_choice(("json", *_TEXT))] = "json",
+) -> Response:
     """Return the pose of every processed scan: `format` is json, tum or csv."""
     if format == "json":
         return answer(to_trajectory(robot.name, view))

@@ -117,7 +117,12 @@ def json_ranges(values: Sequence[float]) -> list[float | str | None]:
 
 Ranges = Annotated[
     Sequence[float],
-    PlainValidator(_check_ranges, json_schema_input_type=list[RangeValue]),
+    PlainValidator(
+        _check_ranges,
+        json_schema_input_type=Annotated[
+            list[RangeValue], Field(min_length=1, max_length=MAX_BEAMS)
+        ],
+    ),
     PlainSerializer(json_ranges, return_type=list[float | str | None], when_used="json"),
 ]
 """Floats after REP-117: NaN = invalid, +inf = no return, -inf = too close."""
@@ -145,7 +150,9 @@ class Scan(Request):
     )
     stamp: Number = Field(description="Seconds on the robot's own clock, time of the first ray.")
     angle_min: Number = Field(description="Direction of the first ray [rad].")
-    angle_increment: Number = Field(description="May be negative; never 0 [rad].")
+    angle_increment: Number = Field(
+        description="May be negative; never 0 [rad].", json_schema_extra={"not": {"const": 0}}
+    )
     angle_max: Number | None = Field(
         default=None,
         description="If given, must agree with the count of ranges to within half an increment.",
