@@ -8,17 +8,20 @@ import numpy as np
 from numba import njit
 
 from lineloom_core.features._kernels import LENGTH, THETA, X1, X2, Y1, Y2
-from lineloom_core.matching._free_space_kernels import CONFLICT, MATCHED, judge_pair
-from lineloom_core.matching._kernels import evidence, fill_row
+from lineloom_core.matching._agreement_kernels import AXIS, BROAD
+from lineloom_core.matching._free_space_kernels import CONFLICT, MATCHED, judge_thinned, thin_points
 from lineloom_core.matching._proposal_kernels import (
     LONG_ENOUGH,
     compatible_pairs,
     rotation_peaks,
     wrap_angle,
 )
-from lineloom_core.matching._refinement_kernels import refine
 
-COARSE_STEP = 10
+PER_ROTATION, WINDOW, TRIED = 3, 0.15, 6
+"""Bands per rotation, how far off [m] walls agree on the offset across, bands looked at."""
+FARTHEST_SLIDE, SLIDE_STEP, SLIDE_STRIDE = 5.0, 0.25, 0.2
+SLIDE_BASE, SLIDE_SLOPE = 0.16, 0.01
+PER_BAND, LEAST_SLIDE, WORTH_A_LOOK = 3, 0.5, 0.6
 
 
 @njit(cache=True)
@@ -105,93 +108,60 @@ def propose_bands(ref, cur, rotations, per_rotation, window):  # type: ignore[no
 
 
 @njit(cache=True)
-def slide_band(  # type: ignore[no-untyped-def]
-    ref_points,
-    ref_ranges,
-    ref_min,
-    ref_inc,
-    cur_points,
-    cur_ranges,
-    cur_min,
-    cur_inc,
-    phi,
-    axis,
-    across,
-    farthest,
-    step,
-    base,
-    slope,
-):
-    """The slide along a band that free space likes best: x, y, theta, matched less conflicts."""
+def slide_profile(ref, cur, ref_thin, cur_thin, band, profile):  # type: ignore[no-untyped-def]
+    """Metres matched less twice those in conflict at every slide along a band, from end to end."""
+    phi, axis, across = band[0], band[1], band[2]
     ux, uy = math.cos(axis), math.sin(axis)
-    counts = np.empty(4)
-    pose = np.empty(3)
-    best = np.array([0.0, 0.0, phi, -1e9])
-    n = int(farthest / step)
+    counts, pose = np.empty(4), np.empty(3)
+    pose[2] = phi
+    n = profile.shape[0] // 2
     for k in range(-n, n + 1):
-        pose[0] = -uy * across + ux * k * step
-        pose[1] = ux * across + uy * k * step
-        pose[2] = phi
-        judge_pair(
-            ref_points, ref_ranges, ref_min, ref_inc, cur_points, cur_ranges, cur_min, cur_inc,
-            pose, COARSE_STEP, base + 0.05, slope, counts,
-        )  # fmt: skip
-        value = COARSE_STEP * (counts[MATCHED] - 3.0 * counts[CONFLICT])
-        if value > best[3]:
-            best[0], best[1], best[3] = pose[0], pose[1], value
-    return best
+        pose[0] = -uy * across + ux * k * SLIDE_STEP
+        pose[1] = ux * across + uy * k * SLIDE_STEP
+        judge_thinned(ref, cur, ref_thin, cur_thin, pose, SLIDE_BASE, SLIDE_SLOPE, counts)
+        profile[k + n] = SLIDE_STRIDE * (counts[MATCHED] - 2.0 * counts[CONFLICT])
 
 
 @njit(cache=True)
-def match_bands(  # type: ignore[no-untyped-def]
-    ref,
-    ref_ends,
-    ref_edges,
-    ref_points,
-    ref_ranges,
-    ref_min,
-    ref_inc,
-    cur,
-    cur_ends,
-    cur_edges,
-    cur_points,
-    cur_ranges,
-    cur_min,
-    cur_inc,
-    rotations,
-    per_rotation,
-    window,
-    tried,
-    farthest,
-    step,
-    iterations,
-    base,
-    slope,
-):
-    """Bands slid to where free space likes them, refined and judged; best evidence first.
+def propose_slides(ref, cur, table, kept, figures, rotations, most):  # type: ignore[no-untyped-def]
+    """The likeliest slides along all bands, as rows x, y, theta, weight, weight; likeliest first.
 
-    Rows: the 16 columns of `_kernels.match_sweeps` (explained and votes are the band's weight),
-    then the band's axis, weight, and whether both sides were seen.
+    Bands are those of parallel walls, and the one that the best of `kept` hypotheses lies on.
     """
-    bands = propose_bands(ref, cur, rotations, per_rotation, window)
-    n = min(bands.shape[0], tried)
-    out = np.empty((n, 19))
-    H = np.empty((3, 3))
-    counts = np.empty(4)
-    rank = np.empty(n)
-    for k in range(n):
-        phi, axis, across, weight, both = bands[k]
-        slid = slide_band(
-            ref_points, ref_ranges, ref_min, ref_inc, cur_points, cur_ranges, cur_min, cur_inc,
-            phi, axis, across, farthest, step, base, slope,
-        )  # fmt: skip
-        pose = slid[:3].copy()
-        overlap = refine(ref, ref_ends, ref_edges, cur, cur_ends, cur_edges, pose, H, iterations)
-        judge_pair(
-            ref_points, ref_ranges, ref_min, ref_inc, cur_points, cur_ranges, cur_min, cur_inc,
-            pose, 1, base, slope, counts,
-        )  # fmt: skip
-        fill_row(out[k], pose, weight, weight, counts, overlap, H)
-        out[k, 16], out[k, 17], out[k, 18] = axis, weight, both
-        rank[k] = evidence(out[k])
-    return out[np.argsort(-rank, kind="mergesort")]
+    found = propose_bands(ref.lines, cur.lines, rotations, PER_ROTATION, WINDOW)
+    bands = np.empty((min(found.shape[0], TRIED) + 1, 5))
+    count = 0
+    if kept > 0:
+        axis = figures[AXIS]
+        bands[0, 0], bands[0, 1] = table[0, 2], axis
+        bands[0, 2] = math.cos(axis) * table[0, 1] - math.sin(axis) * table[0, 0]
+        bands[0, 3], bands[0, 4] = figures[BROAD], 1.0
+        count = 1
+    for k in range(min(found.shape[0], TRIED)):
+        bands[count] = found[k]
+        count += 1
+    ref_thin = thin_points(ref.points, ref.angle_increment, SLIDE_STRIDE)
+    cur_thin = thin_points(cur.points, cur.angle_increment, SLIDE_STRIDE)
+    n = int(FARTHEST_SLIDE / SLIDE_STEP)
+    profile = np.empty(2 * n + 1)
+    rows, values = np.empty((count * PER_BAND, 5)), np.empty(count * PER_BAND)
+    m = 0
+    for b in range(count):
+        slide_profile(ref, cur, ref_thin, cur_thin, bands[b], profile)
+        ux, uy = math.cos(bands[b, 1]), math.sin(bands[b, 1])
+        for _ in range(PER_BAND):
+            k = int(profile.argmax())
+            if profile[k] < LEAST_SLIDE:
+                break
+            along = (k - n) * SLIDE_STEP
+            rows[m, 0] = -uy * bands[b, 2] + ux * along
+            rows[m, 1] = ux * bands[b, 2] + uy * along
+            rows[m, 2], rows[m, 3], rows[m, 4] = bands[b, 0], bands[b, 3], bands[b, 3]
+            values[m] = profile[k]
+            profile[max(k - 1, 0) : k + 2] = -1e9
+            m += 1
+    order = np.argsort(-values[:m], kind="mergesort")
+    keep = 0
+    while keep < min(m, most) and values[order[keep]] >= WORTH_A_LOOK * values[order[0]]:
+        keep += 1
+    return rows[order[:keep]]

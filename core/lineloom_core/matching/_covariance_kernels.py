@@ -25,6 +25,7 @@ from lineloom_core.features._kernels import (
 from lineloom_core.matching._circle_match_kernels import accumulate_centre_noise
 from lineloom_core.matching._refinement_kernels import (
     EDGE_VARIANCE,
+    directions,
     huber,
     line_residual,
     weights_of,
@@ -34,6 +35,10 @@ LEAST_NOISE = 1e-6
 """Variance [m^2] under which no lidar is believed."""
 PRIOR_COUNT = 4.0
 """Points that the scan's own noise counts for beside a line's."""
+UNSEEN = (0.01, 0.01, 1.0)
+"""Information [1/m^2, 1/rad^2] of what nothing observes: 10 m and 1 rad."""
+TRUSTED_COUNT = 10.0
+"""Residuals that agree with their noise and are counted beside the measured ones."""
 FAR_OUT = 0.065
 """Points farther off their line [m] are not noise of it (the split threshold)."""
 
@@ -147,14 +152,15 @@ def accumulate_noise(  # type: ignore[no-untyped-def]
     c, s = math.cos(pose[2]), math.sin(pose[2])
     tx, ty = pose[0], pose[1]
     squares = used = 0.0
+    along = directions(ref)
     for j in range(cur.shape[0]):
         for i in range(ref.shape[0]):
+            ux, uy = along[i, 0], along[i, 1]
             shared, e, da, px, py, mr, mc = line_residual(
-                ref[i], cur[j], c, s, pose, angle_gate, distance_gate
+                ref[i], ux, uy, cur[j], c, s, pose, angle_gate, distance_gate
             )
             if shared <= 0.0:
                 continue
-            ux, uy = math.cos(ref[i, THETA]), math.sin(ref[i, THETA])
             nx, ny = -uy, ux
             var, var_angle = weights_of(ref[i], cur[j], mr, mc)
             w = huber(e, var, 3.0)
@@ -209,16 +215,89 @@ def add_squares(G, noise, M):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def scan_noise(  # type: ignore[no-untyped-def]
-    ref, ref_ends, ref_edges, ref_circles, ref_points, ref_beams, ref_turn, ref_spacing,
-    cur, cur_ends, cur_edges, cur_circles, cur_points, cur_beams, cur_turn, cur_spacing,
-    pose, angle_gate, distance_gate, H, M,
-):  # fmt: skip
+def scan_noise(ref, cur, pose, angle_gate, distance_gate, H, M):  # type: ignore[no-untyped-def]
     """`accumulate_noise` with the noise that the lines' own points show, and that of circles."""
+    ref_noise = line_noise(ref.lines, ref.points, ref.beams, ref.ranges.shape[0])
+    cur_noise = line_noise(cur.lines, cur.points, cur.beams, cur.ranges.shape[0])
     squares, used = accumulate_noise(
-        ref, ref_ends, ref_edges, line_noise(ref, ref_points, ref_beams, ref_turn), ref_spacing,
-        cur, cur_ends, cur_edges, line_noise(cur, cur_points, cur_beams, cur_turn), cur_spacing,
+        ref.lines, ref.ends, ref.edges, ref_noise, ref.angle_increment,
+        cur.lines, cur.ends, cur.edges, cur_noise, cur.angle_increment,
         pose, angle_gate, distance_gate, H, M,
     )  # fmt: skip
-    more, others = accumulate_centre_noise(ref_circles, cur_circles, pose, distance_gate, H, M)
+    more, others = accumulate_centre_noise(ref.circles, cur.circles, pose, distance_gate, H, M)
     return squares + more, used + others
+
+
+@njit(cache=True)
+def invert3(A, out):  # type: ignore[no-untyped-def]
+    """out = A^-1 of a symmetric positive definite 3x3 matrix."""
+    out[0, 0] = A[1, 1] * A[2, 2] - A[1, 2] * A[1, 2]
+    out[0, 1] = A[0, 2] * A[1, 2] - A[0, 1] * A[2, 2]
+    out[0, 2] = A[0, 1] * A[1, 2] - A[0, 2] * A[1, 1]
+    out[1, 1] = A[0, 0] * A[2, 2] - A[0, 2] * A[0, 2]
+    out[1, 2] = A[0, 1] * A[0, 2] - A[0, 0] * A[1, 2]
+    out[2, 2] = A[0, 0] * A[1, 1] - A[0, 1] * A[0, 1]
+    det = A[0, 0] * out[0, 0] + A[0, 1] * out[0, 1] + A[0, 2] * out[0, 2]
+    for a in range(3):
+        for b in range(a, 3):
+            out[a, b] /= det
+            out[b, a] = out[a, b]
+
+
+@njit(cache=True)
+def congruence(A, S, out):  # type: ignore[no-untyped-def]
+    """out = A S A' of 3x3 matrices, A and S symmetric."""
+    for a in range(3):
+        for b in range(a, 3):
+            total = 0.0
+            for p in range(3):
+                for q in range(3):
+                    total += A[a, p] * S[p, q] * A[q, b]
+            out[a, b] = total
+            out[b, a] = total
+
+
+@njit(cache=True)
+def forget_along(covariance, axis, sigma):  # type: ignore[no-untyped-def]
+    """Make sigma [m] of what is known along `axis`, and keep what is known across and of the turn.
+
+    The axis is that of the reference's walls and as noisy as they are, which is half of what is not
+    known of the rotation: a slide of metres along it is one of millimetres across.
+    """
+    c, s = math.cos(axis), math.sin(axis)
+    keep = np.eye(3)
+    keep[0, 0] -= c * c
+    keep[0, 1] -= c * s
+    keep[1, 0] -= c * s
+    keep[1, 1] -= s * s
+    before = covariance.copy()
+    congruence(keep, before, covariance)
+    along, across = sigma * sigma, sigma * sigma * 0.5 * before[2, 2]
+    covariance[0, 0] += along * c * c + across * s * s
+    covariance[0, 1] += (along - across) * c * s
+    covariance[1, 0] += (along - across) * c * s
+    covariance[1, 1] += along * s * s + across * c * c
+
+
+@njit(cache=True)
+def fill_covariance(  # type: ignore[no-untyped-def]
+    ref, cur, pose, angle_gate, distance_gate, axis, sigma, always, covariance
+):
+    """The covariance of `pose`; see `covariance.py`.
+
+    Along `axis` sigma [m] is claimed, `always` or where lines know less than that.
+    """
+    H, M, inverse = np.zeros((3, 3)), np.zeros((3, 3)), np.empty((3, 3))
+    squares, used = scan_noise(ref, cur, pose, angle_gate, distance_gate, H, M)
+    ratio = (squares + TRUSTED_COUNT) / (max(used - 3.0, 0.0) + TRUSTED_COUNT)
+    for a in range(3):
+        H[a, a] += UNSEEN[a]
+        for b in range(3):
+            M[a, b] *= ratio
+        M[a, a] += UNSEEN[a]
+    invert3(H, inverse)
+    congruence(inverse, M, covariance)
+    c, s = math.cos(axis), math.sin(axis)
+    known = c * c * covariance[0, 0] + 2.0 * c * s * covariance[0, 1] + s * s * covariance[1, 1]
+    if always or known > sigma * sigma:
+        forget_along(covariance, axis, sigma)

@@ -98,6 +98,45 @@ def judge_points(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def thin_points(points, spacing, stride):  # type: ignore[no-untyped-def]
+    """Every so many metres of wall one point, (k, 2): each stands for `stride` metres.
+
+    The wall of a point is what `judge_points` takes it for: the beams' distance, at most 5 cm.
+    """
+    out = np.empty_like(points)
+    count = 0
+    sum_ = 0.5 * stride
+    for k in range(points.shape[0]):
+        px, py = points[k, 0], points[k, 1]
+        sum_ += min(math.sqrt(px * px + py * py) * spacing, 0.05)
+        if sum_ >= stride:
+            sum_ -= stride
+            out[count, 0], out[count, 1] = px, py
+            count += 1
+    return out[:count]
+
+
+@njit(cache=True)
+def judge_thinned(ref, cur, ref_thin, cur_thin, pose, base, slope, counts):  # type: ignore[no-untyped-def]
+    """`judge_pair` of two sweeps by thinned points: counts (4,) are numbers of points."""
+    counts[:] = 0.0
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    tx, ty = pose[0], pose[1]
+    per_radian = 1.0 / ref.angle_increment
+    turn = 2.0 * math.pi * per_radian
+    for k in range(cur_thin.shape[0]):
+        px, py = cur_thin[k, 0], cur_thin[k, 1]
+        x, y = c * px - s * py + tx, s * px + c * py + ty
+        counts[judge_point(x, y, ref.ranges, ref.angle_min, per_radian, turn, base, slope)] += 1.0
+    per_radian = 1.0 / cur.angle_increment
+    turn = 2.0 * math.pi * per_radian
+    for k in range(ref_thin.shape[0]):
+        px, py = ref_thin[k, 0] - tx, ref_thin[k, 1] - ty
+        x, y = c * px + s * py, c * py - s * px
+        counts[judge_point(x, y, cur.ranges, cur.angle_min, per_radian, turn, base, slope)] += 1.0
+
+
+@njit(cache=True)
 def judge_cloud(  # type: ignore[no-untyped-def]
     points, step, pose, ranges, angle_mins, angle_increments, poses, base, slope, counts
 ):

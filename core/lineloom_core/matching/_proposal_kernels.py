@@ -24,6 +24,8 @@ from lineloom_core.features._kernels import (
 
 BINS = 360
 LONG_ENOUGH = 3.0
+MOST_CELLS = 4096
+"""Cells that may have votes."""
 
 
 @njit(cache=True)
@@ -124,14 +126,36 @@ def overlap_length(line, ux, uy, ax, ay, bx, by):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True)
+def add_vote(slots, cells, used, cell, half, w, tx, ty):  # type: ignore[no-untyped-def]
+    """Add a vote for a translation to its cell; returns the number of cells in use."""
+    n = slots.shape[0]
+    gx, gy = math.floor((tx + half) / cell), math.floor((ty + half) / cell)
+    if gx < 0 or gy < 0 or gx >= n or gy >= n:
+        return used
+    k = slots[gx, gy] - 1
+    if k < 0:
+        if used >= cells.shape[0]:
+            return used
+        k = used
+        used += 1
+        slots[gx, gy] = used
+        cells[k, 0], cells[k, 1] = gx, gy
+        cells[k, 2] = cells[k, 3] = cells[k, 4] = 0.0
+    cells[k, 2] += w
+    cells[k, 3] += w * tx
+    cells[k, 4] += w * ty
+    return used
+
+
+@njit(cache=True)
 def vote_translations(  # type: ignore[no-untyped-def]
-    ref, ref_ends, ref_edges, cur, cur_ends, cur_edges, phi, pairs, count, cell, half, grid, touched
+    ref, ref_ends, ref_edges, cur, cur_ends, cur_edges, phi, pairs, count, cell, half, slots, cells
 ):
     """Vote for translations: two non-parallel constraints meet in one point; same edges coincide.
 
-    grid: (3, n, n) zeros: weight and weighted x, y. touched: scratch. Returns touched cells.
+    slots: (n, n) zeros, becomes one more than each voted cell's row in `cells`: its place in the
+    grid (x, y), the votes' weight and their weighted x and y. Returns the number of those rows.
     """
-    n = grid.shape[1]
     c, s = math.cos(phi), math.sin(phi)
     offs = np.empty(count)
     nx, ny = np.empty(count), np.empty(count)
@@ -154,15 +178,8 @@ def vote_translations(  # type: ignore[no-untyped-def]
                 ex = c * cur_edges[j, side, 0] - s * cur_edges[j, side, 1]
                 ey = s * cur_edges[j, side, 0] + c * cur_edges[j, side, 1]
                 tx, ty = ref_edges[i, side, 0] - ex, ref_edges[i, side, 1] - ey
-                gx, gy = math.floor((tx + half) / cell), math.floor((ty + half) / cell)
-                if 0 <= gx < n and 0 <= gy < n:
-                    if grid[0, gx, gy] == 0.0:
-                        touched[used, 0], touched[used, 1] = gx, gy
-                        used += 1
-                    w = 0.7 * min(wp, 1.0)
-                    grid[0, gx, gy] += w
-                    grid[1, gx, gy] += w * tx
-                    grid[2, gx, gy] += w * ty
+                w = 0.7 * min(wp, 1.0)
+                used = add_vote(slots, cells, used, cell, half, w, tx, ty)
         for q in range(p + 1, count):
             k, m = pairs[q, 0], pairs[q, 1]
             if i == k or j == m:
@@ -172,8 +189,7 @@ def vote_translations(  # type: ignore[no-untyped-def]
                 continue
             tx = (offs[p] * ny[q] - offs[q] * ny[p]) / sine
             ty = (nx[p] * offs[q] - nx[q] * offs[p]) / sine
-            gx, gy = math.floor((tx + half) / cell), math.floor((ty + half) / cell)
-            if gx < 0 or gy < 0 or gx >= n or gy >= n:
+            if abs(tx) > half or abs(ty) > half:
                 continue
             op = overlap_length(ref[i], ny[p], -nx[p], ends[p, 0] + tx, ends[p, 1] + ty,
                                 ends[p, 2] + tx, ends[p, 3] + ty)  # fmt: skip
@@ -184,55 +200,41 @@ def vote_translations(  # type: ignore[no-untyped-def]
             if oq < 0.3 * min(ref[k, LENGTH], cur[m, LENGTH]):
                 continue
             w = math.sqrt(min(op, LONG_ENOUGH) * min(oq, LONG_ENOUGH))
-            if grid[0, gx, gy] == 0.0:
-                if used >= touched.shape[0]:
-                    continue
-                touched[used, 0], touched[used, 1] = gx, gy
-                used += 1
-            grid[0, gx, gy] += w
-            grid[1, gx, gy] += w * tx
-            grid[2, gx, gy] += w * ty
+            used = add_vote(slots, cells, used, cell, half, w, tx, ty)
     return used
 
 
 @njit(cache=True)
-def vote_peaks(grid, touched, used, most, out):  # type: ignore[no-untyped-def]
-    """The best cells (3 x 3 sums, non-maxima suppressed) as rows x, y, votes; clears the grid."""
-    n = grid.shape[1]
-    sums = np.empty(used)
+def vote_peaks(slots, cells, used, most, out):  # type: ignore[no-untyped-def]
+    """The best cells (3 x 3 sums, non-maxima suppressed) as rows x, y, votes; clears the slots."""
+    n = slots.shape[0]
+    sums = np.empty((used, 3))
     for t in range(used):
-        total = 0.0
-        for dx in range(-1, 2):
-            for dy in range(-1, 2):
-                gx, gy = touched[t, 0] + dx, touched[t, 1] + dy
-                if 0 <= gx < n and 0 <= gy < n:
-                    total += grid[0, gx, gy]
-        sums[t] = total
+        gx0, gy0 = int(cells[t, 0]), int(cells[t, 1])
+        sums[t] = 0.0
+        for gx in range(max(gx0 - 1, 0), min(gx0 + 2, n)):
+            for gy in range(max(gy0 - 1, 0), min(gy0 + 2, n)):
+                k = slots[gx, gy] - 1
+                if k >= 0:
+                    for a in range(3):
+                        sums[t, a] += cells[k, 2 + a]
     count = 0
     while count < most:
         top, where = 0.0, -1
         for t in range(used):
-            if sums[t] > top:
-                top, where = sums[t], t
+            if sums[t, 0] > top:
+                top, where = sums[t, 0], t
         if where < 0:
             break
-        gx0, gy0 = touched[where, 0], touched[where, 1]
-        sx = sy = total = 0.0
-        for dx in range(-1, 2):
-            for dy in range(-1, 2):
-                gx, gy = gx0 + dx, gy0 + dy
-                if 0 <= gx < n and 0 <= gy < n:
-                    total += grid[0, gx, gy]
-                    sx += grid[1, gx, gy]
-                    sy += grid[2, gx, gy]
-        out[count, 0], out[count, 1], out[count, 2] = sx / total, sy / total, top
+        out[count, 0], out[count, 1] = sums[where, 1] / top, sums[where, 2] / top
+        out[count, 2] = top
         count += 1
+        gx0, gy0 = cells[where, 0], cells[where, 1]
         for t in range(used):
-            if abs(touched[t, 0] - gx0) <= 1 and abs(touched[t, 1] - gy0) <= 1:
-                sums[t] = -1.0
+            if abs(cells[t, 0] - gx0) <= 1 and abs(cells[t, 1] - gy0) <= 1:
+                sums[t, 0] = -1.0
     for t in range(used):
-        for k in range(3):
-            grid[k, touched[t, 0], touched[t, 1]] = 0.0
+        slots[int(cells[t, 0]), int(cells[t, 1])] = 0
     return count
 
 
@@ -301,9 +303,9 @@ def propose(  # type: ignore[no-untyped-def]
     phis = rotation_peaks(ref, cur, rotations, least_share, math.radians(3.0))
     table = np.empty((phis.shape[0] * cells, 5))
     n = int(2.0 * half / cell) + 1
-    grid = np.zeros((3, n, n))
+    slots = np.zeros((n, n), dtype=np.int32)
     pairs = np.empty((pair_limit, 2), dtype=np.int64)
-    touched = np.empty((min(n * n, pair_limit * pair_limit), 2), dtype=np.int64)
+    voted = np.empty((min(n * n, MOST_CELLS), 5))
     peaks = np.empty((cells, 3))
     taken = np.empty(cur.shape[0])
     rows = 0
@@ -312,9 +314,9 @@ def propose(  # type: ignore[no-untyped-def]
         count = compatible_pairs(ref, cur, phi, math.radians(6.0), pair_limit, pairs)
         used = vote_translations(
             ref, ref_ends, ref_edges, cur, cur_ends, cur_edges,
-            phi, pairs, count, cell, half, grid, touched,
+            phi, pairs, count, cell, half, slots, voted,
         )  # fmt: skip
-        found = vote_peaks(grid, touched, used, cells, peaks)
+        found = vote_peaks(slots, voted, used, cells, peaks)
         for k in range(found):
             tx, ty = peaks[k, 0], peaks[k, 1]
             table[rows, 0], table[rows, 1], table[rows, 2] = tx, ty, phi

@@ -32,6 +32,8 @@ EDGE_VARIANCE = 0.0025
 """Of a corner or a wall's end along the wall [m^2]."""
 LAST_ANGLE_GATE, LAST_DISTANCE_GATE = math.radians(3.0), 0.12
 """What the gates shrink to."""
+MOST_TURNED = math.radians(13.0)
+"""Farther than this no refinement turns."""
 
 
 @njit(cache=True)
@@ -62,8 +64,10 @@ def huber(e, var, sigmas):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def line_residual(ref, cur, c, s, pose, angle_gate, distance_gate):  # type: ignore[no-untyped-def]
+def line_residual(ref, ux, uy, cur, c, s, pose, angle_gate, distance_gate):  # type: ignore[no-untyped-def]
     """One current line against one reference line at `pose`, c and s its cosine and sine.
+
+    ux, uy: direction of the reference line.
 
     Only the part that both share is evidence. Returns its length (0 where the lines do not lie on
     each other), the distance across of its middle, the difference of directions, the middle of the
@@ -74,7 +78,6 @@ def line_residual(ref, cur, c, s, pose, angle_gate, distance_gate):  # type: ign
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     ax, ay = c * cur[X1] - s * cur[Y1] + pose[0], s * cur[X1] + c * cur[Y1] + pose[1]
     bx, by = c * cur[X2] - s * cur[Y2] + pose[0], s * cur[X2] + c * cur[Y2] + pose[1]
-    ux, uy = math.cos(ref[THETA]), math.sin(ref[THETA])
     ea, eb = ux * ay - uy * ax - ref[OFFSET], ux * by - uy * bx - ref[OFFSET]
     s1 = ux * ref[X1] + uy * ref[Y1]
     s2 = s1 + ref[LENGTH]
@@ -115,45 +118,67 @@ def add_residual(H, g, jx, jy, jt, w, e):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def directions(lines):  # type: ignore[no-untyped-def]
+    """Cosine and sine of each line's direction, (n, 2)."""
+    out = np.empty((lines.shape[0], 2))
+    for i in range(lines.shape[0]):
+        out[i, 0], out[i, 1] = math.cos(lines[i, THETA]), math.sin(lines[i, THETA])
+    return out
+
+
+@njit(cache=True)
+def lines_alike(ref, cur, phi, reach, pairs):  # type: ignore[no-untyped-def]
+    """Fill `pairs` (i, j) with the lines that lie within `reach` of one direction under phi."""
+    count = 0
+    for j in range(cur.shape[0]):
+        for i in range(ref.shape[0]):
+            if abs(wrap_angle(ref[i, THETA] - cur[j, THETA] - phi)) <= reach:
+                pairs[count, 0], pairs[count, 1] = i, j
+                count += 1
+    return count
+
+
+@njit(cache=True)
 def accumulate_lines(  # type: ignore[no-untyped-def]
-    ref, ref_ends, ref_edges, cur, cur_ends, cur_edges, pose, angle_gate, distance_gate, H, g
-):
+    ref, ref_along, ref_ends, ref_edges, cur, cur_ends, cur_edges, pairs, count,
+    pose, angle_gate, distance_gate, H, g,
+):  # fmt: skip
     """Add the normal equations of point-to-line, angle and end-point residuals at `pose`.
 
-    Residuals of current lines against reference lines, parameters (x, y, theta) of
-    T_reference_current. Returns the overlapped length.
+    Residuals of current lines against reference lines, the first `count` of `pairs`, parameters
+    (x, y, theta) of T_reference_current. Returns the overlapped length.
     """
     c, s = math.cos(pose[2]), math.sin(pose[2])
     tx, ty = pose[0], pose[1]
     total = 0.0
-    for j in range(cur.shape[0]):
-        for i in range(ref.shape[0]):
-            shared, e, da, px, py, mr, mc = line_residual(
-                ref[i], cur[j], c, s, pose, angle_gate, distance_gate
-            )
-            if shared <= 0.0:
+    for p in range(count):
+        i, j = pairs[p, 0], pairs[p, 1]
+        ux, uy = ref_along[i, 0], ref_along[i, 1]
+        shared, e, da, px, py, mr, mc = line_residual(
+            ref[i], ux, uy, cur[j], c, s, pose, angle_gate, distance_gate
+        )
+        if shared <= 0.0:
+            continue
+        total += shared
+        nx, ny = -uy, ux
+        # The middle of the shared part, across the line.
+        var, var_angle = weights_of(ref[i], cur[j], mr, mc)
+        j2 = -nx * (py - ty) + ny * (px - tx)
+        add_residual(H, g, nx, ny, j2, huber(e, var, 3.0), e)
+        # Direction.
+        w = huber(da, var_angle, 3.0)
+        H[2, 2] += w
+        g[2] += w * da
+        # End points: a corner seen in both scans fixes the slide along the line.
+        for side in range(2):
+            if ref_ends[i, side] != EDGE or cur_ends[j, side] != EDGE:
                 continue
-            total += shared
-            ux, uy = math.cos(ref[i, THETA]), math.sin(ref[i, THETA])
-            nx, ny = -uy, ux
-            # The middle of the shared part, across the line.
-            var, var_angle = weights_of(ref[i], cur[j], mr, mc)
-            j2 = -nx * (py - ty) + ny * (px - tx)
-            add_residual(H, g, nx, ny, j2, huber(e, var, 3.0), e)
-            # Direction.
-            w = huber(da, var_angle, 3.0)
-            H[2, 2] += w
-            g[2] += w * da
-            # End points: a corner seen in both scans fixes the slide along the line.
-            for side in range(2):
-                if ref_ends[i, side] != EDGE or cur_ends[j, side] != EDGE:
-                    continue
-                qx = c * cur_edges[j, side, 0] - s * cur_edges[j, side, 1]
-                qy = s * cur_edges[j, side, 0] + c * cur_edges[j, side, 1]
-                e = ux * (qx + tx - ref_edges[i, side, 0]) + uy * (qy + ty - ref_edges[i, side, 1])
-                if abs(e) <= distance_gate:
-                    w = huber(e, EDGE_VARIANCE, 2.0)
-                    add_residual(H, g, ux, uy, -ux * qy + uy * qx, w, e)
+            qx = c * cur_edges[j, side, 0] - s * cur_edges[j, side, 1]
+            qy = s * cur_edges[j, side, 0] + c * cur_edges[j, side, 1]
+            e = ux * (qx + tx - ref_edges[i, side, 0]) + uy * (qy + ty - ref_edges[i, side, 1])
+            if abs(e) <= distance_gate:
+                w = huber(e, EDGE_VARIANCE, 2.0)
+                add_residual(H, g, ux, uy, -ux * qy + uy * qx, w, e)
     H[1, 0], H[2, 0], H[2, 1] = H[0, 1], H[0, 2], H[1, 2]
     return total
 
@@ -178,19 +203,22 @@ def refine_all(  # type: ignore[no-untyped-def]
     """
     angle_gate, distance_gate = math.radians(7.0), 0.25
     total = 0.0
-    g = np.zeros(3)
+    g, A = np.zeros(3), np.empty((3, 3))
+    along = directions(ref)
+    pairs = np.empty((ref.shape[0] * cur.shape[0], 2), dtype=np.int64)
+    count = lines_alike(ref, cur, pose[2], angle_gate + MOST_TURNED, pairs)
     for it in range(iterations + 1):
         H[:] = 0.0
         g[:] = 0.0
         total = accumulate_lines(
-            ref, ref_ends, ref_edges, cur, cur_ends, cur_edges,
+            ref, along, ref_ends, ref_edges, cur, cur_ends, cur_edges, pairs, count,
             pose, angle_gate, distance_gate, H, g,
         )  # fmt: skip
         if ref_circles.shape[0] > 0 and cur_circles.shape[0] > 0:
             total += accumulate_circles(ref_circles, cur_circles, pose, distance_gate, H, g)
         if it == iterations or total == 0.0:
             break
-        A = H.copy()
+        A[:] = H
         # A weak prior keeps what no line constrains where the hypothesis put it.
         A[0, 0] += 25.0
         A[1, 1] += 25.0

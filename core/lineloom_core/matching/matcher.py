@@ -1,11 +1,11 @@
 """The default matcher: two scans, no pose, an honest answer (design §5).
 
 Steps: 1-3. rotations by the histogram of direction differences, translations by votes of line
-pairs, ranking by explained length; 4. refinement; 5. free space both ways; 6. observability;
-7. uniqueness; 8. calibrated score. Steps 1 to 5 run in one kernel (`_kernels.match_sweeps`).
+pairs, ranking by explained length; 4. refinement; 5. free space both ways; 6. slides: where votes
+leave a doubt, parallel walls are slid along each other; 7. the rivals of the best hypothesis;
+8. calibrated probabilities. Steps 1 to 7 run in one kernel (`_kernels.match_sweeps`).
 Columns and round rooms take part in steps 1 to 4 where both scans show them: centres coincide, and
 their distances to lines and to each other name rotations (`_circle_match_kernels`).
-Where no full pose convinces, two scans of one corridor may still share its walls (`band`).
 
 Beyond the thesis (chapters 4 and 5): directions are compared first and translations are voted
 for, instead of counting equal relations in a matching table; every hypothesis is verified
@@ -14,26 +14,24 @@ against what both scans saw through, and the answer may be "weak" or "ambiguous"
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lineloom_core.features import ExtractionConfig, ScanFeatures, extract_features
-from lineloom_core.geometry import Pose, angle_difference
-from lineloom_core.matching import _kernels, _proposal_kernels
+from lineloom_core.geometry import Pose
+from lineloom_core.matching import _agreement_kernels as _agreement
+from lineloom_core.matching import _hypothesis, _kernels, _proposal_kernels
 from lineloom_core.matching._circle_match_kernels import circle_pairs
-from lineloom_core.matching.band import Band, as_band, band_hypotheses
-from lineloom_core.matching.covariance import pose_covariance
-from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
+from lineloom_core.matching._hypothesis import CONFLICT, INFORMATION, MATCHED, OVERLAP
+from lineloom_core.matching._sweep import Search, Sweep
+from lineloom_core.matching.covariance import Claim, pose_covariance
 from lineloom_core.matching.result import Alternative, LinePair, MatchResult, Verdict
-from lineloom_core.matching.score import probability
+from lineloom_core.matching.score import Belief, believe
 from lineloom_core.scan import Scan
 
-Row = list[float]
-"""A hypothesis as `_kernels.match_sweeps` gives it."""
-X, Y, ANGLE, EXPLAINED, VOTES, MATCHED, CONFLICT, OCCLUDED, OUTSIDE, OVERLAP = range(10)
+_CLAIMS: dict[Verdict, Claim] = {"match": "found", "weak": "weak"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,11 +42,12 @@ class MatcherConfig:
     cells, cell, half: translation cells kept per rotation, their size, greatest translation.
     pair_limit: line pairs per rotation. reach: how far off a line explains another before
     refinement. coarse_keep, fine_keep: hypotheses that see the coarse and the full free-space
-    check. weak_below: information [1/m^2] under which a direction is weak; turn_below: the same
-    of the rotation [1/rad^2]. per_circle: rotations tried per pair of circles. rival_distance,
-    rival_angle: what counts as another place. least_margin: lead over the rival. most_conflict,
-    least_evidence: what a hypothesis must show to be one.
-    least_score: how sure a "match" must be.
+    check. per_circle: rotations tried per pair of circles. turn_below: information of the rotation
+    [1/rad^2] under which it is not known. least_margin: lead over another place. most_unrefuted:
+    share of the best one's evidence that another place may have which nothing contradicts.
+    most_conflict, least_evidence: what a hypothesis must show to be one. least_score: how sure a
+    "match" must be. least_belief: how sure of its rotation and position across a "weak" one must
+    be; most_slide: and how unsure of the position along at least.
     """
 
     rotations: int = 8
@@ -61,16 +60,23 @@ class MatcherConfig:
     coarse_keep: int = 24
     fine_keep: int = 8
     iterations: int = 3
-    weak_below: float = 300.0
     turn_below: float = 400.0
     per_circle: int = 4
-    rival_distance: float = 0.3
-    rival_angle: float = 0.15
     least_margin: float = 0.15
-    most_conflict: float = 0.25
-    least_evidence: float = 3.0
-    least_score: float = 0.7
+    most_unrefuted: float = 0.5
+    most_conflict: float = 0.35
+    least_evidence: float = 1.5
+    least_score: float = 0.85
+    least_belief: float = 0.5
+    most_slide: float = 0.9
     extraction: ExtractionConfig = field(default_factory=ExtractionConfig)
+
+    def search(self) -> Search:
+        """What the kernels take of this."""
+        return Search(
+            self.rotations, self.cells, self.least_share, self.pair_limit, self.cell, self.half,
+            self.reach, self.coarse_keep, self.fine_keep, self.iterations, self.per_circle,
+        )  # fmt: skip
 
 
 class LineMatcher:
@@ -78,6 +84,7 @@ class LineMatcher:
 
     def __init__(self, config: MatcherConfig | None = None) -> None:
         self.config = config or MatcherConfig()
+        self._search = self.config.search()
 
     @property
     def name(self) -> str:
@@ -96,105 +103,38 @@ class LineMatcher:
         """Match features that have been extracted already."""
         r, c = _comparable(reference, current)
         result = self._match(r, c)
-        pose = result.T_reference_current or result.best
-        if (r is reference and c is current) or pose is None:
+        if (r is reference and c is current) or result.best is None:
             return result
-        return replace(result, pairs=line_pairs(reference, current, pose))
+        return replace(result, pairs=line_pairs(reference, current, result.best))
 
     def _match(self, reference: ScanFeatures, current: ScanFeatures) -> MatchResult:
-        """Full poses first; where none convinces, the parallel walls that both saw."""
         if min(_primitives(reference), _primitives(current)) < 2:
             return _none("fewer than two line segments in a scan, and no circle")
-        table = self._hypotheses(reference, current)
-        result = self._decide(reference, current, table)
-        if result.verdict != "none":
-            return result
-        bands = band_hypotheses(reference, current)
-        if len(bands) == 0:
-            return result
-        result = self._decide(reference, current, _by_evidence(table, bands))
-        if result.verdict in {"match", "ambiguous"}:
-            return result
-        band = next((b for b in map(as_band, bands) if b.convincing), None)
-        if band is None:
-            return _unsure(result)
-        pose, along = band.T_reference_current, band.direction
-        covariance = pose_covariance(reference, current, pose, along)
-        return _as_weak(result, band, covariance, line_pairs(reference, current, pose))
-
-    def _decide(
-        self, reference: ScanFeatures, current: ScanFeatures, table: NDArray[np.float64]
-    ) -> MatchResult:
-        """Steps 6 to 8 on a table of hypotheses, best first."""
+        r, c = Sweep.of(reference), Sweep.of(current)
+        table, figures = _kernels.match_sweeps(r, c, self._search)
         if len(table) == 0:
             return _none("no rotation and translation that two line pairs agree on")
-        rows: list[Row] = table.tolist()  # some fifteen numbers: plain floats are quicker here
-        best = rows[0]
-        pose = Pose(best[X], best[Y], best[ANGLE])
-        information = best[10:16]
-        turn = _turn_information(information)
-        weak_direction, lambda_min = _weakness(information, self.config.weak_below)
-        if turn < self.config.turn_below:
-            weak_direction = None  # it turns, so that no straight slide describes it
-        rivals = self._rivals(rows, pose, weak_direction)
-        checks = {**_checks(best, rivals, lambda_min), "turn_information": turn}
-        score = probability(checks)
-        verdict, reason = self._verdict(checks, score, weak_direction)
+        checks = _checks(table[0], figures)
+        belief = believe(checks)
+        verdict, reason = self._verdict(checks, belief)
+        axis = checks["axis"]
+        pose = Pose.from_array(table[0, :3])
+        known = verdict != "none"
+        claim = _CLAIMS.get(verdict, "lines")
         return MatchResult(
             verdict=verdict,
-            T_reference_current=None if verdict == "none" else pose,
-            weak_direction=weak_direction if verdict == "weak" else None,
-            covariance=None
-            if verdict == "none"
-            else pose_covariance(reference, current, pose, weak_direction),
-            score=score,
+            T_reference_current=pose if known else None,
+            weak_direction=axis if verdict == "weak" else None,
+            covariance=pose_covariance(r, c, pose, axis, claim) if known else None,
+            score=belief.full,
             reason=reason,
             best=pose,
             pairs=line_pairs(reference, current, pose),
             checks=checks,
-            alternatives=tuple(
-                Alternative(Pose(r[X], r[Y], r[ANGLE]), score * _ratio(r, best)) for r in rivals
-            ),
+            alternatives=_alternatives(table, belief.full, axis if verdict == "weak" else None),
         )
 
-    def _hypotheses(self, r: ScanFeatures, c: ScanFeatures) -> NDArray[np.float64]:
-        k = self.config
-        limits = (
-            k.rotations, k.cells, k.least_share, k.pair_limit, k.cell, k.half, k.reach,
-            k.coarse_keep, k.fine_keep, k.iterations, TOLERANCE, TOLERANCE_SLOPE,
-        )  # fmt: skip
-        table: NDArray[np.float64]
-        if len(r.circles) and len(c.circles):
-            table = _kernels.match_round_sweeps(
-                r.lines, r.ends, r.edges, r.circles,
-                r.points, r.ranges, r.angle_min, r.angle_increment,
-                c.lines, c.ends, c.edges, c.circles,
-                c.points, c.ranges, c.angle_min, c.angle_increment, *limits, k.per_circle,
-            )  # fmt: skip
-            return table
-        table = _kernels.match_sweeps(
-            r.lines, r.ends, r.edges, r.points, r.ranges, r.angle_min, r.angle_increment,
-            c.lines, c.ends, c.edges, c.points, c.ranges, c.angle_min, c.angle_increment, *limits,
-        )  # fmt: skip
-        return table
-
-    def _rivals(self, rows: list[Row], best: Pose, weak_direction: float | None) -> list[Row]:
-        """Hypotheses that are another place; a slide along a weak direction is the same one."""
-        found = []
-        for row in rows[1:]:
-            dx, dy = row[X] - best.x, row[Y] - best.y
-            if weak_direction is None:
-                apart = math.hypot(dx, dy)
-            else:
-                apart = abs(dy * math.cos(weak_direction) - dx * math.sin(weak_direction))
-            turned = abs(angle_difference(row[ANGLE], best.theta))
-            if apart > self.config.rival_distance or turned > self.config.rival_angle:
-                found.append(row)
-        return found
-
-    def _verdict(
-        self, checks: dict[str, float], score: float, weak_direction: float | None
-    ) -> tuple[Verdict, str]:
+    def _verdict(self, checks: dict[str, float], belief: Belief) -> tuple[Verdict, str]:
         config = self.config
         if checks["evidence"] < config.least_evidence:
             return "none", f"only {checks['evidence']:.1f} m of wall speak for the best hypothesis"
@@ -205,11 +145,13 @@ class LineMatcher:
             return "ambiguous", "nothing seen by both fixes the rotation about what is round"
         if checks["margin"] < config.least_margin:
             return "ambiguous", "another hypothesis fits almost as well"
-        if weak_direction is not None:
+        if checks["unrefuted_share"] > config.most_unrefuted:
+            return "ambiguous", "another hypothesis explains less, but nothing contradicts it"
+        if belief.full >= config.least_score and checks["slide_margin"] >= config.least_margin:
+            return "match", "all checks passed"
+        if belief.family >= config.least_belief and belief.slide <= config.most_slide:
             return "weak", "nothing seen by both fixes the position along one direction"
-        if score < config.least_score:
-            return "none", f"the best hypothesis is right with a probability of only {score:.2f}"
-        return "match", "all checks passed"
+        return "none", f"the best hypothesis is right with a probability of only {belief.full:.2f}"
 
 
 def _comparable(r: ScanFeatures, c: ScanFeatures) -> tuple[ScanFeatures, ScanFeatures]:
@@ -224,102 +166,61 @@ def _primitives(f: ScanFeatures) -> int:
     return len(f) + 2 * len(f.circles)
 
 
-def _by_evidence(table: NDArray[np.float64], bands: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Both kinds of hypotheses in one table, best first; equals keep their order."""
-    joined = np.vstack([table, bands[:, : table.shape[1]]])
-    rank = joined[:, OVERLAP] + joined[:, MATCHED] - 3.0 * joined[:, CONFLICT]
-    ordered: NDArray[np.float64] = joined[np.argsort(-rank, kind="stable")]
-    return ordered
-
-
-def _unsure(result: MatchResult) -> MatchResult:
-    """A lone wall may be any wall: not even a weak answer."""
-    if result.verdict != "weak":
-        return result
-    return replace(
-        result,
-        verdict="none",
-        T_reference_current=None,
-        weak_direction=None,
-        covariance=None,
-        reason="too little is shared to tell one wall from another",
-    )
-
-
-def _as_weak(
-    result: MatchResult,
-    band: Band,
-    covariance: NDArray[np.float64],
-    pairs: tuple[LinePair, ...],
-) -> MatchResult:
-    """The same two parallel walls are an answer where no full pose convinces."""
-    return replace(
-        result,
-        verdict="weak",
-        T_reference_current=band.T_reference_current,
-        weak_direction=band.direction,
-        covariance=covariance,
-        reason="only parallel walls are shared: the position along them is not known",
-        pairs=pairs,
-        checks={**result.checks, **band.checks()},
-    )
-
-
 def line_pairs(reference: ScanFeatures, current: ScanFeatures, pose: Pose) -> tuple[LinePair, ...]:
     """Line segments that lie on each other under `pose`, by extraction numbers."""
     rows = _proposal_kernels.lying_pairs(
-        reference.lines, current.lines, pose.to_array(), math.radians(5.0), 0.12, 0.1
-    )
+        reference.lines, current.lines, pose.to_array(),
+        _agreement.LYING_ANGLE, _agreement.LYING_DISTANCE, _agreement.LYING_OVERLAP,
+    )  # fmt: skip
     return tuple(LinePair(int(i), int(j), o, d, a) for i, j, o, d, a in rows.tolist())
 
 
-def _weakness(information: Row, weak_below: float) -> tuple[float | None, float]:
-    """Weak direction [rad, 0..pi) or None, and the least eigenvalue of the translation's Schur
-    complement [1/m^2]. information: the upper triangle, row by row.
-    """
-    a, b, c, d, e, f = information
-    f = max(f, 1e-9)
-    xx, xy, yy = a - c * c / f, b - c * e / f, d - e * e / f
-    least = 0.5 * (xx + yy) - math.hypot(0.5 * (xx - yy), xy)
-    if least >= weak_below:
-        return None, least
-    strong = 0.5 * math.atan2(2.0 * xy, xx - yy)  # the axis of the greater eigenvalue
-    return (strong + 0.5 * math.pi) % math.pi, least
-
-
-def _turn_information(information: Row) -> float:
-    """Information [1/rad^2] of the rotation while the translation is not known."""
-    a, b, c, d, e, f = information
-    a, d = a + 0.01, d + 0.01  # where nothing fixes a translation it says nothing of the rotation
-    det = a * d - b * b
-    return f - (d * c * c - 2.0 * b * c * e + a * e * e) / det
-
-
-def _evidence(row: Row) -> float:
-    """As `_kernels.evidence`: metres of wall that speak for a hypothesis."""
-    return row[OVERLAP] + row[MATCHED] - 3.0 * row[CONFLICT]
-
-
-def _checks(best: Row, rivals: list[Row], lambda_min: float) -> dict[str, float]:
-    evidence = _evidence(best)
-    rival = max((_evidence(r) for r in rivals), default=0.0)
-    judged = max(best[MATCHED] + best[CONFLICT], 1e-9)
+def _checks(best: NDArray[np.float64], figures: NDArray[np.float64]) -> dict[str, float]:
+    """The figures behind the answer, by name; metres, shares, information in 1/m^2, 1/rad^2."""
+    row, f = best.tolist(), figures.tolist()
+    information = row[INFORMATION:]
+    matched, conflict = row[MATCHED], row[CONFLICT]
+    occluded, outside = row[_hypothesis.OCCLUDED], row[_hypothesis.OUTSIDE]
+    evidence = max(f[_agreement.BEST], 1e-9)
+    rival, slide = max(f[_agreement.OTHER], 0.0), max(f[_agreement.SLIDE], 0.0)
+    least, _ = _hypothesis.translation_information(*information)
     return {
-        "evidence": evidence,
-        "rival_evidence": max(rival, 0.0),
-        "margin": 1.0 - max(rival, 0.0) / evidence if evidence > 0.0 else 0.0,
-        "overlap_m": best[OVERLAP],
-        "matched_m": best[MATCHED],
-        "conflict_m": best[CONFLICT],
-        "conflict_share": best[CONFLICT] / judged,
-        "matched_share": best[MATCHED] / (judged + best[OCCLUDED]),
-        "information": lambda_min,
+        "evidence": f[_agreement.BEST],
+        "rival_evidence": rival,
+        "unrefuted_evidence": max(f[_agreement.UNREFUTED], 0.0),
+        "slide_evidence": slide,
+        "margin": 1.0 - rival / evidence,
+        "unrefuted_share": max(f[_agreement.UNREFUTED], 0.0) / evidence,
+        "slide_margin": 1.0 - slide / evidence,
+        "overlap_m": row[OVERLAP],
+        "matched_m": matched,
+        "conflict_m": conflict,
+        "conflict_share": conflict / max(matched + conflict, 1e-9),
+        "matched_share": matched / max(matched + conflict + occluded, 1e-9),
+        "seen_share": matched / max(matched + conflict + occluded + outside, 1e-9),
+        "walls": f[_agreement.WALLS],
+        "weaker_m": f[_agreement.LEAN],
+        "stronger_m": f[_agreement.BROAD],
+        "facing_m": f[_agreement.FACING],
+        "information": least,
+        "turn_information": _hypothesis.turn_information(*information),
+        "axis": f[_agreement.AXIS],
     }
 
 
-def _ratio(rival: Row, best: Row) -> float:
-    top = _evidence(best)
-    return min(max(_evidence(rival) / top, 0.0), 1.0) if top > 0.0 else 0.0
+def _alternatives(
+    table: NDArray[np.float64], score: float, axis: float | None
+) -> tuple[Alternative, ...]:
+    """The rivals, best first; for a weak answer, slides along `axis` are the same one."""
+    best = table[0]
+    top = _hypothesis.evidence(best)
+    found = []
+    for row in table[1:]:
+        same = axis is not None and _agreement.is_slide(row, best, axis)
+        if not same and _agreement.is_apart(row, best):
+            share = min(max(_hypothesis.evidence(row) / top, 0.0), 1.0) if top > 0.0 else 0.0
+            found.append(Alternative(Pose.from_array(row[:3]), score * share))
+    return tuple(found)
 
 
 def _none(reason: str) -> MatchResult:

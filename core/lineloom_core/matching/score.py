@@ -1,38 +1,101 @@
 """The calibrated score: how sure that the full pose of the best hypothesis is right.
 
-A logistic model of the checks' figures, fitted on simulated pairs only (`lineloom_core.
-evaluation.calibration`, `make calibrate`), so that no real data set has been tuned on.
+Two questions, two logistic models of the checks' figures: are its rotation and its position across
+the walls right (`family`: the hypothesis and all its slides along them), and if so, is it the right
+one of these slides? The score is the product. Both are fitted on simulated pairs only
+(`python -m lineloom_core.evaluation.calibration`), so that no real data set has been tuned on.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
+FAMILY_FEATURES = (
+    "evidence", "conflict", "conflict_m", "matched_share", "seen_share", "lead", "rival", "facing",
+    "walls", "loose", "turn",
+)  # fmt: skip
+FAMILY_WEIGHTS = (
+    0.973,
+    -0.410,
+    -2.123,
+    -0.455,
+    1.067,
+    0.666,
+    -0.332,
+    0.117,
+    5.112,
+    1.977,
+    -0.473,
+)
+FAMILY_BIAS = -5.565
+SLIDE_FEATURES = ("margin", "lead", "weaker", "loose")
+SLIDE_WEIGHTS = (
+    0.690,
+    1.151,
+    2.897,
+    -0.011,
+)
+SLIDE_BIAS = -0.052
 
-FEATURES = ("evidence", "conflict", "matched_share", "margin", "information", "overlap", "weak")
-WEIGHTS = (2.61, -1.665, -0.078, 0.831, 0.444, -0.628, -0.918)
-BIAS = -5.453
+
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """Probabilities 0..1. family: right but for a slide. slide: the right slide, if that."""
+
+    family: float
+    slide: float
+
+    @property
+    def full(self) -> float:
+        """Probability that the whole pose is right."""
+        return self.family * self.slide
 
 
-def descriptors(checks: Mapping[str, float]) -> NDArray[np.float64]:
-    """The model's inputs, in the order of FEATURES, each of order one."""
-    return np.array(
-        [
-            math.log1p(max(checks["evidence"], 0.0)),
-            min(checks["conflict_share"], 0.5) * 10.0,
-            checks["matched_share"] * 3.0,
-            min(max(checks["margin"], 0.0), 1.0) * 3.0,
-            math.log10(max(checks["information"], 1.0)),
-            math.log1p(checks["overlap_m"]),
-            1.0 if checks["information"] < 300.0 else 0.0,
-        ]
+def family_descriptors(checks: Mapping[str, float]) -> list[float]:
+    """The first model's inputs, in the order of FAMILY_FEATURES, each of order one."""
+    evidence, rival = max(checks["evidence"], 0.0), checks["rival_evidence"]
+    return [
+        math.log1p(evidence),
+        min(checks["conflict_share"], 0.5) * 10.0,
+        math.log1p(checks["conflict_m"]),
+        checks["matched_share"] * 3.0,
+        checks["seen_share"] * 3.0,
+        math.log1p(max(evidence - rival, 0.0)),
+        math.log1p(rival),
+        math.log1p(checks["facing_m"]),
+        math.log1p(checks["walls"]),
+        _loose(checks),
+        math.log10(max(checks["turn_information"], 1.0)),
+    ]
+
+
+def slide_descriptors(checks: Mapping[str, float]) -> list[float]:
+    """The second model's inputs, in the order of SLIDE_FEATURES, each of order one."""
+    evidence = max(checks["evidence"], 0.0)
+    return [
+        min(max(checks["slide_margin"], 0.0), 1.0) * 3.0,
+        math.log1p(max(evidence - checks["slide_evidence"], 0.0)),
+        math.log1p(checks["weaker_m"]),
+        _loose(checks),
+    ]
+
+
+def believe(checks: Mapping[str, float]) -> Belief:
+    """Probabilities of what the checks speak of."""
+    return Belief(
+        _logistic(FAMILY_WEIGHTS, FAMILY_BIAS, family_descriptors(checks)),
+        _logistic(SLIDE_WEIGHTS, SLIDE_BIAS, slide_descriptors(checks)),
     )
 
 
-def probability(checks: Mapping[str, float]) -> float:
-    """Probability, 0..1, that the best hypothesis is right in full."""
-    z = BIAS + float(np.dot(WEIGHTS, descriptors(checks)))
+def _loose(checks: Mapping[str, float]) -> float:
+    """Of what is matched, what no pair of lines accounts for: the small things that stand about."""
+    on_lines = 2.0 * (checks["weaker_m"] + checks["stronger_m"])
+    return math.log1p(max(checks["matched_m"] - on_lines, 0.0))
+
+
+def _logistic(weights: Sequence[float], bias: float, inputs: Sequence[float]) -> float:
+    z = bias + sum(w * x for w, x in zip(weights, inputs, strict=True))
     return 1.0 / (1.0 + math.exp(-min(max(z, -30.0), 30.0)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,21 +30,28 @@ def heaviest_pairs(
     return pairs, count
 
 
-def as_tuples(pairs: NDArray[np.int64], count: int) -> list[tuple[int, int]]:
-    return [(int(i), int(j)) for i, j in pairs[:count]]
+def as_tuples(pairs: NDArray[Any], count: int) -> list[tuple[int, int]]:
+    return [(int(row[0]), int(row[1])) for row in pairs[:count]]
 
 
 def cast_votes(
     ref: ScanFeatures, cur: ScanFeatures, phi: float
-) -> tuple[Floats, NDArray[np.int64], int]:
+) -> tuple[NDArray[np.int32], Floats, int]:
     pairs, count = heaviest_pairs(ref, cur, phi)
-    grid = np.zeros((3, SIDE, SIDE))
-    touched = np.empty((SIDE * SIDE, 2), dtype=np.int64)
+    slots = np.zeros((SIDE, SIDE), dtype=np.int32)
+    cells = np.empty((SIDE * SIDE, 5))
     used = fast.vote_translations(
         ref.lines, ref.ends, ref.edges, cur.lines, cur.ends, cur.edges,
-        phi, pairs, count, CELL, HALF, grid, touched,
+        phi, pairs, count, CELL, HALF, slots, cells,
     )  # fmt: skip
-    return grid, touched, used
+    return slots, cells, used
+
+
+def as_grid(cells: Floats) -> Floats:
+    grid = np.zeros((3, SIDE, SIDE))
+    for x, y, *sums in cells:
+        grid[:, int(x), int(y)] = sums
+    return grid
 
 
 @pytest.mark.parametrize("angle", [0.0, 1.0, -math.pi, math.pi, 7.0, -40.0])
@@ -101,22 +109,23 @@ def test_overlap_of_segments() -> None:
 def test_votes_for_translations(feature_pairs: list[FeaturePair]) -> None:
     for ref, cur, T in feature_pairs:
         pairs, count = heaviest_pairs(ref, cur, T.theta)
-        grid, touched, used = cast_votes(ref, cur, T.theta)
+        slots, cells, used = cast_votes(ref, cur, T.theta)
         votes = slow.votes(ref, cur, T.theta, as_tuples(pairs, count))
-        expected, cells = slow.vote_grid(votes, CELL, HALF, SIDE)
+        expected, order = slow.vote_grid(votes, CELL, HALF, SIDE)
         assert np.count_nonzero(expected[0]) >= 2
-        np.testing.assert_allclose(grid, expected, atol=1e-7)
-        assert as_tuples(touched, used) == cells
+        np.testing.assert_allclose(as_grid(cells[:used]), expected, atol=1e-7)
+        assert as_tuples(cells, used) == order
+        assert [int(slots[at]) for at in order] == list(range(1, used + 1))
 
 
 def test_the_best_cells_and_the_grid_left_empty(feature_pairs: list[FeaturePair]) -> None:
     for ref, cur, T in feature_pairs:
-        grid, touched, used = cast_votes(ref, cur, T.theta)
-        expected = slow.best_cells(grid.copy(), as_tuples(touched, used), 12)
+        slots, cells, used = cast_votes(ref, cur, T.theta)
+        expected = slow.best_cells(as_grid(cells[:used]), as_tuples(cells, used), 12)
         out = np.empty((12, 3))
-        count = fast.vote_peaks(grid, touched, used, 12, out)
+        count = fast.vote_peaks(slots, cells, used, 12, out)
         np.testing.assert_allclose(out[:count], expected, atol=1e-7)
-        assert not grid.any()
+        assert not slots.any()
         assert np.hypot(*(out[:count, :2] - [T.x, T.y]).T).min() < 0.15
 
 

@@ -45,7 +45,12 @@ def test_normal_equations_are_those_of_a_numeric_jacobian(
     for ref, cur, T in feature_pairs:
         for pose in (T.to_array(), (T @ NEAR).to_array()):
             H, g = np.zeros((3, 3)), np.zeros(3)
-            total = fast.accumulate_lines(*lines_of(ref), *lines_of(cur), pose, *gates, H, g)
+            pairs = np.empty((len(ref) * len(cur), 2), dtype=np.int64)
+            count = fast.lines_alike(ref.lines, cur.lines, pose[2], gates[0], pairs)
+            total = fast.accumulate_lines(
+                ref.lines, fast.directions(ref.lines), ref.ends, ref.edges, *lines_of(cur),
+                pairs, count, pose, *gates, H, g,
+            )  # fmt: skip
             found, expected_total = slow.residuals(ref, cur, pose, *gates)
             assert len(found) > 4
             expected_H, expected_g = slow.normal_equations(found, pose)

@@ -63,9 +63,10 @@ def tallies(pairs: list[Scene]) -> tuple[Tally, Tally, list[MatchResult]]:
 
 
 def test_columns_tell_the_way_along_a_corridor() -> None:
-    """Two parallel walls: lines alone are mostly weak; with the columns nearly all is a match.
+    """Two parallel walls: with the columns nearly all is a match, and surely so.
 
-    What lines alone match they owe to chords of the columns, seen from much the same side.
+    Without circles the columns' points still speak in free space, but less is known: the pose is
+    less exact, and the matcher less sure.
     """
     corridor = column_corridor(3)
     low, high = Pose(-20.0, 1.7, -0.5), Pose(20.0, 2.3, 0.5)
@@ -73,9 +74,7 @@ def test_columns_tell_the_way_along_a_corridor() -> None:
     with_them, alone, _ = tallies(pairs)
     assert with_them["match", True] >= 28, with_them
     assert with_them["match", False] == 0
-    weak = alone["weak", True] + alone["weak", False]
-    assert weak >= 10, alone
-    assert alone["match", True] <= 0.6 * len(pairs), alone
+    assert alone["match", False] == 0, alone
 
 
 def test_columns_tell_the_way_around_a_hall() -> None:

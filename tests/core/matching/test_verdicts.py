@@ -92,6 +92,17 @@ def test_half_a_symmetric_room_is_never_matched_wrongly(turn: float) -> None:
     assert result.verdict != "match" or is_right(result.best, a.between(b))
 
 
+@pytest.mark.parametrize("size", [5.0, 6.0, 8.0])
+@pytest.mark.parametrize("turn", [1.1, 1.75, 2.6])
+def test_half_a_square_room_is_ambiguous(turn: float, size: float) -> None:
+    """Every quarter turn fits, and some wrong one shares more wall than the right one."""
+    a = Pose(0.4 * size, 0.45 * size, 0.3)
+    b = Pose(0.55 * size, 0.5 * size, 0.3 + turn)
+    result = two_scans(rectangle(size, size), sick_lms200(), a, b)
+    assert result.verdict == "ambiguous"
+    assert result.alternatives
+
+
 @BOTH
 def test_rooms_of_other_sizes_are_not_matched(lidar: Lidar) -> None:
     small, large = rectangle(4.0, 3.0), rectangle(13.0, 9.0)
