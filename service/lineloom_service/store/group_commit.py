@@ -72,6 +72,7 @@ class GroupCommit:
 
     async def start(self) -> None:
         """Read the ledger, telling the listener of all sites, and start."""
+        self._closing = False
         outcome = await self._commit([None])
         self._tell(outcome)
         # Whatever waits in the log may be due already.
