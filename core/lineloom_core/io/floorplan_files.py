@@ -12,7 +12,6 @@ from ezdxf import units
 from ezdxf.disassemble import recursive_decompose, to_primitives
 from ezdxf.enums import InsertUnits
 from ezdxf.filemanagement import read as read_dxf
-from ezdxf.lldxf.const import DXFError
 
 from lineloom_core.floorplan.plan import MOST_LINES, FloorPlan, FloorPlanError
 
@@ -57,8 +56,8 @@ def _text(text: str) -> Iterator[Segment]:
 def _geojson(text: str) -> Iterator[Segment]:
     try:
         document = json.loads(text)
-    except ValueError as error:
-        raise FloorPlanError(f"is not JSON: {error}") from None
+    except (ValueError, RecursionError) as error:
+        raise FloorPlanError(f"is not JSON that can be read: {error}") from None
     if not isinstance(document, dict):
         raise FloorPlanError("is no GeoJSON object")
     if document.get("type") == "FeatureCollection":
@@ -80,10 +79,16 @@ def _geometry(geometry: Any, where: str) -> Iterator[Segment]:
         return
     if not isinstance(geometry, dict):
         raise FloorPlanError(f"{where}: must be an object")
-    kind, coordinates = geometry.get("type"), geometry.get("coordinates")
+    kind, coordinates = str(geometry.get("type")), geometry.get("coordinates")
     depth = {"LineString": 1, "MultiLineString": 2, "Polygon": 2, "MultiPolygon": 3}
     if kind == "GeometryCollection":
-        for i, part in enumerate(geometry.get("geometries") or []):
+        parts = geometry.get("geometries")
+        if not isinstance(parts, list):
+            raise FloorPlanError(f"{where}/geometries: must be a list")
+        for i, part in enumerate(parts):
+            # One in another would be GeoJSON, but nobody's plan; and has no end.
+            if isinstance(part, dict) and part.get("type") == kind:
+                raise FloorPlanError(f"{where}/geometries/{i}: a collection within a collection")
             yield from _geometry(part, f"{where}/geometries/{i}")
     elif kind in depth:
         yield from _rings(coordinates, depth[kind], f"{where}/coordinates")
@@ -99,21 +104,37 @@ def _rings(coordinates: Any, depth: int, where: str) -> Iterator[Segment]:
             yield from _rings(part, depth - 1, f"{where}/{i}")
         return
     try:
-        points = [(float(p[0]), float(p[1])) for p in coordinates]
-    except (TypeError, ValueError, IndexError, KeyError):
+        points = [(_number(p[0]), _number(p[1])) for p in coordinates]
+    except (TypeError, IndexError, KeyError, OverflowError):
         raise FloorPlanError(f"{where}: positions must be pairs of numbers") from None
     yield from _chain(points, where)
+
+
+def _number(value: object) -> float:
+    """Return a number of JSON; a bool is none, nor is a string."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise TypeError
+    return float(value)
 
 
 def _dxf(text: str) -> Iterator[Segment]:
     """Yield lines, polylines and curves of the model space, blocks taken apart, in metres."""
     try:
-        document = read_dxf(io.StringIO(text))
-    except (DXFError, ValueError, OSError) as error:
-        raise FloorPlanError(f"is no DXF that can be read: {error}") from None
+        yield from _dxf_segments(text)
+    except FloorPlanError:
+        raise
+    except Exception as error:
+        # ezdxf meets a broken file with whatever its parts happen to raise.
+        reason = str(error).strip().splitlines()[:1] or [type(error).__name__]
+        raise FloorPlanError(f"is no DXF that can be read: {reason[0][:200]}") from None
+
+
+def _dxf_segments(text: str) -> Iterator[Segment]:
+    document = read_dxf(io.StringIO(text))
     scale = 1.0
     if document.units != InsertUnits.Unitless:
-        scale = float(units.conversion_factor(InsertUnits(document.units), InsertUnits.Meters))
+        units_in = InsertUnits(document.units)
+        scale = float(units.conversion_factor(units_in, InsertUnits.Meters))
     kinds = {"LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE"}
     entities = (e for e in recursive_decompose(document.modelspace()) if e.dxftype() in kinds)
     for primitive in to_primitives(entities, max_flattening_distance=_CURVE_STEP_M / scale):

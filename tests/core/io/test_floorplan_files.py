@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import math
+import random
 from typing import Any
 
 import numpy as np
@@ -87,6 +89,13 @@ def test_curves_become_chords_that_stay_near() -> None:
         (geojson({"type": "Blob"}), "geojson", "features/0/geometry: 'Blob' is no type"),
         (geojson({"type": "LineString", "coordinates": [[0], [1]]}), "geojson", "pairs of numbers"),
         (geojson({"type": "LineString", "coordinates": 7}), "geojson", "must be a list"),
+        (geojson({"type": "LineString", "coordinates": [[True, 0], [1, 1]]}), "geojson", "pairs"),
+        (geojson({"type": "LineString", "coordinates": [["1", 0], [1, 1]]}), "geojson", "pairs"),
+        (geojson({"type": "LineString", "coordinates": [[10**400, 0]]}), "geojson", "pairs"),
+        (geojson({"type": "GeometryCollection", "geometries": 5}), "geojson", "must be a list"),
+        (b'{"type":"GeometryCollection","geometries":[' * 9, "geojson", "not JSON"),
+        (b"[" * 100_000, "geojson", "not JSON"),
+        (geojson({"type": ["Blob"]}), "geojson", "is no type"),
         (geojson({"type": "Point", "coordinates": [0, 0]}), "geojson", "no line"),
         (b"0\nSECTION\n", "dxf", "no DXF"),
         (b"hello", "dxf", "no DXF"),
@@ -95,3 +104,22 @@ def test_curves_become_chords_that_stay_near() -> None:
 def test_broken_plans_are_told_where(content: bytes, format: PlanFormat, what: str) -> None:
     with pytest.raises(FloorPlanError, match=what):
         read_plan(content, format)
+
+
+@pytest.mark.parametrize("format", ["dxf", "geojson", "text"])
+def test_whatever_is_sent_is_a_plan_or_a_told_error(format: PlanFormat) -> None:
+    """Mutations of good files: nothing but FloorPlanError may come out."""
+    rng = random.Random(7)
+    seeds = {"dxf": dxf(), "text": b"0,0,5,0\n0 1 2 3\n"}
+    seed = seeds.get(format, geojson({"type": "Polygon", "coordinates": [RING]}))
+    pieces = [b"1e999", b"nan", b"9" * 30, b"\n", b"[", b"{", b"  0\nINSERT\n", b"null"]
+    for _ in range(300):
+        content = bytearray(seed)
+        for _ in range(rng.randint(1, 8)):
+            at = rng.randrange(len(content) + 1)
+            if rng.random() < 0.5:
+                content[at : at + rng.randint(1, 30)] = bytes([rng.randrange(256)])
+            else:
+                content[at:at] = rng.choice(pieces)
+        with contextlib.suppress(FloorPlanError):
+            assert len(read_plan(bytes(content), format).lines) > 0
