@@ -283,3 +283,22 @@ def test_a_robots_command_line_needs_no_core(tmp_path: Path, log: Path, loopback
         assert done.returncode == code, done.stderr
         assert said in done.stdout + done.stderr
         assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("status", "kind", "advice", "code"),
+    [
+        (404, "unknown-site", "`lineloom status` lists the sites", 1),
+        (404, "unknown-component", "lists the components", 1),
+        (404, "no-floor-plan", "`lineloom floorplan put FILE`", 1),
+        (409, "not-registered", "`lineloom floorplan show`", 4),
+        (422, "invalid-parameter", "", 1),
+    ],
+)
+def test_what_the_service_refuses_is_told_with_what_to_do_next(
+    status: int, kind: str, advice: str, code: int, loopback: str, fake: FakeService
+) -> None:
+    fake.routes["GET", "/v1/sites/s/map"] = problem(status, kind, "the reason")
+    said = one_line(run("map", "--site", "s", "--url", loopback), code)
+    assert "the reason" in said
+    assert advice in said

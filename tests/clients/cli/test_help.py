@@ -79,3 +79,29 @@ def test_the_version_is_told() -> None:
     result = CliRunner().invoke(app, ["--version"])
     assert result.exit_code == 0
     assert re.fullmatch(r"lineloom \d+\.\d+\.\d+\n", result.output)
+
+
+def test_every_query_has_output_for_scripts() -> None:
+    queries: list[Any] = [ROOT.commands[n] for n in ("map", "trajectory", "graph", "match")]
+    queries += [ROOT.commands[n] for n in ("status", "doctor", "replay", "simulate", "demo")]
+    for group, names in (("export", ("create", "list")), ("floorplan", ("put", "show"))):
+        queries += [ROOT.commands[group].commands[n] for n in names]
+    queries.append(ROOT.commands["floorplan"].commands["differences"])
+    for command in queries:
+        assert any("--json" in p.opts for p in command.params), command.name
+
+
+@pytest.mark.parametrize("group", [n for n in NAMES if hasattr(ROOT.commands[n], "commands")])
+def test_every_command_of_a_group_has_an_example_and_describes_its_options(group: str) -> None:
+    for name, command in ROOT.commands[group].commands.items():
+        text = CliRunner().invoke(app, [group, name, "--help"]).output
+        assert f"lineloom {group} {name}" in text.split("Example:", 1)[1], name
+        for parameter in command.params:
+            if "--help" not in parameter.opts:
+                assert getattr(parameter, "help", None), (group, name, parameter.opts)
+
+
+def test_completion_names_the_commands() -> None:
+    words = {"_LINELOOM_COMPLETE": "complete_bash", "COMP_WORDS": "lineloom do", "COMP_CWORD": "1"}
+    done = CliRunner().invoke(app, [], env=words, prog_name="lineloom")
+    assert set(done.output.split()) == {"doctor"}

@@ -9,6 +9,7 @@ from lineloom.errors import (
     ConnectionFailedError,
     LineloomError,
     NotIdleError,
+    ProblemError,
     UnexpectedAnswerError,
 )
 
@@ -28,7 +29,26 @@ EXIT_CODES = """Exit codes:
   1  it failed: a file or the service said no; the message says why
   2  the command line is wrong
   3  the service cannot be reached
-  4  done, but the answer is no: no match, robots not merged, map not idle in time"""
+  4  done, but the answer is no: no match, robots not merged, map not idle in time, no place in
+     the floor plan, or the doctor found something wrong"""
+
+_NEXT = {
+    "unknown-site": "`lineloom status` lists the sites.",
+    "unknown-robot": "`lineloom status --site NAME` lists the robots.",
+    "unknown-component": "`lineloom status --site NAME` lists the components.",
+    "unknown-export": "`lineloom export list` lists them.",
+    "no-floor-plan": "Send one with `lineloom floorplan put FILE`.",
+    "not-registered": "`lineloom floorplan show` says how it stands with each component.",
+    "not-connected": "Let them drive through the same rooms.",
+    "not-ready": "Wait a little, or ask `lineloom doctor`.",
+    "backlog-full": "Wait until the map has caught up: `lineloom status` says how far it is.",
+    "storage": "Is the server's disk full? Its log says more.",
+    "internal": "The server's log says more.",
+}
+"""What to do about a problem of the service, by the last part of its type."""
+
+_NO = {"not-registered", "not-connected"}
+"""Problems that are answers."""
 
 
 class CommandError(Exception):
@@ -55,6 +75,10 @@ def explained(error: Exception) -> CommandError | None:
         return CommandError(f"{error}. Give a token with --token or LINELOOM_TOKEN.")
     if isinstance(error, UnexpectedAnswerError):
         return CommandError(f"{error}. Is this address a Lineloom service of this version?")
+    if isinstance(error, ProblemError):
+        slug = error.type.rsplit("/", 1)[-1]
+        advice = f". {_NEXT[slug]}" if slug in _NEXT else ""
+        return CommandError(f"{error}{advice}", Exit.NEGATIVE if slug in _NO else Exit.FAILED)
     if isinstance(error, LineloomError):
         return CommandError(str(error))
     if isinstance(error, OSError) and error.filename is not None:
