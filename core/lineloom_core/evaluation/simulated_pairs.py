@@ -92,8 +92,8 @@ def driven_pairs(
         here, there = poses[k], poses[int(rng.choice(fit))]
         count -= 1
         yield SimulatedPair(
-            lidar.scan(world, here, rng, disks=_bystanders(here, rng, people)),
-            lidar.scan(world, there, rng, disks=_bystanders(there, rng, people)),
+            lidar.scan(world, here, rng, disks=bystanders(here, rng, people)),
+            lidar.scan(world, there, rng, disks=bystanders(there, rng, people)),
             here.between(there),
             negative,
         )
