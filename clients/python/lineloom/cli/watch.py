@@ -6,7 +6,7 @@ import time
 from types import TracebackType
 from typing import Self
 
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from lineloom.cli.console import err, note
 from lineloom.cli.player import Played
@@ -34,10 +34,10 @@ class Watch:
         self._began_at = self._told_at = time.monotonic()
         self._merged: set[str] = set()
         self._progress = Progress(
-            TextColumn("{task.description:7}"),
-            BarColumn(),
+            # All of it fits a terminal of 80 columns.
+            TextColumn("{task.description:6}"),
+            BarColumn(bar_width=8),
             MofNCompleteColumn(),
-            TimeElapsedColumn(),
             TextColumn("{task.fields[state]}"),
             console=err,
             disable=not err.is_terminal,
