@@ -12,6 +12,7 @@ from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from lineloom_service.store import tables
 from lineloom_service.store.choice import database_at
+from lineloom_service.store.files import FileRecord
 from lineloom_service.store.records import (
     BacklogFullError,
     NewScan,
@@ -263,3 +264,48 @@ async def test_migrations_and_tables_say_the_same(store: SqlStore) -> None:
         return found
 
     assert await store._read(differences) == []
+
+
+def _file(name: str, content: bytes, created: float) -> FileRecord:
+    return FileRecord(name, "{}", "0" * 64, len(content), created, content)
+
+
+async def test_files_are_kept_replaced_and_listed_without_their_data(
+    store: SqlStore, make_store: MakeStore
+) -> None:
+    await _post(store, [0])
+    site = (await _record(store)).id
+    first, second = _file("b", b"one", 1.0), _file("a", b"two", 2.0)
+    assert await store.put_file(site, "export", first)
+    assert await store.put_file(site, "export", second)
+    assert await store.put_file(site, "floorplan", _file("plan", b"walls", 3.0))
+    assert await store.put_file(site, "floorplan", _file("plan", b"other walls", 4.0))
+    listed = await store.files(site, "export")
+    assert [(f.name, f.size, f.data) for f in listed] == [("b", 3, None), ("a", 3, None)]
+    await store.close()
+    again = make_store()
+    await again.open()
+    try:
+        assert await again.read_file(site, "export", "b") == first
+        plan = await again.read_file(site, "floorplan", "plan")
+        assert plan is not None
+        assert plan.data == b"other walls"
+        assert await again.read_file(site, "export", "plan") is None
+        assert await again.delete_file(site, "export", "b")
+        assert not await again.delete_file(site, "export", "b")
+    finally:
+        await again.close()
+    await store.open()
+
+
+async def test_files_go_with_their_site(store: SqlStore) -> None:
+    await _post(store, [0])
+    site = (await _record(store)).id
+    await store.put_file(site, "export", _file("a", b"one", 1.0))
+    await store.delete_site("site")
+    for _ in range(200):
+        if not await store.files(site, "export"):
+            break
+        await asyncio.sleep(0.01)
+    assert await store.files(site, "export") == []
+    assert not await store.put_file(site, "export", _file("a", b"late", 2.0))

@@ -56,10 +56,10 @@ async def post_export(
         raise ProblemError(UNKNOWN_COMPONENT, detail)
     content = await _render(service, site, view, wanted)
     file = _file(view, wanted, content)
-    if await service.store.read_file(site.id, "export", file.name) is None:
+    kept = await service.store.read_file(site.id, "export", file.name)
+    if kept is None:
         await service.store.put_file(site.id, "export", file)
-    kept = await service.store.read_file(site.id, "export", file.name) or file
-    export = _export(request, site, kept)
+    export = _export(request, site, kept or file)
     return answer(export, status=201, headers={"Location": export.url})
 
 
