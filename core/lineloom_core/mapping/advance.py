@@ -37,7 +37,7 @@ def advance(site: SiteMap, keyframe: Keyframe) -> Advance:
     """Take the next keyframe of the history."""
     site.append(keyframe)
     optimised = _close_loops(site, keyframe.id)
-    place = _place_if_due(site, site.track(keyframe.id))
+    place = _place_if_due(site, site.track(keyframe.id)) if keyframe.trusted else None
     if place is None:
         return Advance(optimised=optimised)
     merges, moved = consider(site, place)

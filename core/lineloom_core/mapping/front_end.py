@@ -1,19 +1,22 @@
 """A robot's scans become keyframes: steps 1 to 4, which no belief about the map enters.
 
-Steps of `take`: 1. bring the scan into counter-clockwise order, undo an inverted mount; 2. extract
-its features; 3. track it against the robot's own last keyframes, or open a new track, without any
-link, where nothing fits; 4. a scan that moved on becomes a keyframe. A scan that comes after its
-successors is placed against the keyframes around it and tracks nothing.
+Steps of `take`: 1. bring the scan into counter-clockwise order, undo an inverted mount and what the
+sensor doctor knows to be wrong; 2. extract its features; 3. track it against the robot's own last
+keyframes, or open a new track, without any link, where nothing fits; 4. a scan that moved on
+becomes a keyframe; 5. let the doctor look at it, and distrust the robot where its geometry is
+certainly wrong. A scan that comes after its successors is placed against the keyframes around it
+and tracks nothing.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lineloom_core.features import ScanFeatures, extract_features
 from lineloom_core.geometry import Pose
+from lineloom_core.health import without_skew
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.constraint import step_information
 from lineloom_core.mapping.history import History
@@ -29,11 +32,15 @@ _AROUND = 4
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """placed: the scan has a pose. keyframe: what was made of it. started: it opened a track."""
+    """placed: the scan has a pose. keyframe: what was made of it. started: it opened a track.
+
+    distrusted: the robot's keyframes have just lost their trust.
+    """
 
     placed: bool
     keyframe: Keyframe | None = None
     started: bool = False
+    distrusted: bool = False
 
 
 def take(
@@ -41,19 +48,45 @@ def take(
 ) -> Taken:
     """Process a robot's next scan, the log's entry number `version`."""
     record.processed += 1
-    scan = scan.counter_clockwise(inverted=record.mount.inverted)
-    features = extract_features(scan, config.extraction)
-    cloud = Cloud.of(features)
-    if _is_late(record, scan):
-        return _back_fill(config, history, record, scan, cloud)
-    if scan.session != record.session:
+    is_late = _is_late(record, scan)
+    if scan.session != record.session and not is_late:
         record.tracker = None  # restarted: it may have been carried anywhere
         record.sessions[scan.session] = None
+        record.trust_again()
+    raw = _in_order(record, scan, is_late=is_late)
+    scan = record.doctor.prepared(raw)
+    features = extract_features(scan, config.extraction)
+    cloud = Cloud.of(features)
+    if is_late:
+        return _back_fill(config, history, record, scan, cloud)
     record.session, record.seq, record.stamp = scan.session, scan.seq, scan.stamp
     tracked = _track(config, record, scan, features, cloud) if len(features.points) else None
     if tracked is None or tracked.pose is None:
-        return _unplaced(record)
-    return _place(config, history, record, scan, tracked, version)
+        taken = _unplaced(record)
+    else:
+        taken = _place(config, history, record, scan, tracked, version)
+    record.doctor.examine(raw, features, tracked.pose if tracked else None, record.track)
+    return _distrust(history, record, taken)
+
+
+def _in_order(record: RobotRecord, scan: Scan, *, is_late: bool) -> Scan:
+    """Step 1: without the skew of turning, where beams are timed, and counter-clockwise."""
+    inverted = record.mount.inverted
+    if record.tracker is not None and not is_late:
+        scan = without_skew(scan, record.tracker.turn_rate, inverted=inverted)
+    return scan.counter_clockwise(inverted=inverted)
+
+
+def _distrust(history: History, record: RobotRecord, taken: Taken) -> Taken:
+    """Step 5: once an error is found, nothing of the robot's session is to be believed."""
+    if taken.keyframe is None or record.distrusted:
+        return taken
+    errors = [f.name for f in record.doctor.findings() if f.severity == "error"]
+    if not errors:
+        return taken
+    record.distrusted = errors[0]
+    history.distrust(record.name, taken.keyframe.scan.session)
+    return replace(taken, keyframe=history.keyframes[taken.keyframe.id], distrusted=True)
 
 
 def _is_late(record: RobotRecord, scan: Scan) -> bool:
@@ -122,6 +155,7 @@ def _place(
         step=_step(history, record, tracked),
         version=version,
         extraction=config.extraction,
+        trusted=not record.distrusted,
     )
     history.add(keyframe)
     record.last_keyframe = keyframe.id

@@ -7,6 +7,8 @@ be had again by `rebuild`.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from lineloom_core.mapping.keyframe import Keyframe
 
 
@@ -31,6 +33,12 @@ class History:
     def add(self, keyframe: Keyframe) -> None:
         """Append a keyframe."""
         self.keyframes[keyframe.id] = keyframe
+
+    def distrust(self, robot: str, session: str) -> None:
+        """Mark all keyframes of a robot's session: its lidar's geometry is wrong."""
+        for k, f in self.keyframes.items():
+            if f.robot == robot and f.scan.session == session:
+                self.keyframes[k] = replace(f, trusted=False)
 
     def forget(self, robot: str) -> None:
         """Drop a robot's keyframes."""

@@ -35,6 +35,7 @@ class Keyframe:
     scan: counter-clockwise, mount inversion already undone. track: the run of tracking without a
     break that it belongs to. T_track_laser: where the tracker put it; the graph knows better.
     step: None for the first of a track. version: number of the log entry that brought it.
+    trusted: False where its lidar's geometry is certainly wrong: no place is made of it.
     Features and cloud are functions of the scan; a snapshot leaves them out.
     """
 
@@ -46,6 +47,7 @@ class Keyframe:
     step: Step | None
     version: int
     extraction: ExtractionConfig = field(repr=False)
+    trusted: bool = True
 
     @cached_property
     def features(self) -> ScanFeatures:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from lineloom_core.geometry import Pose
+from lineloom_core.health import SensorDoctor
 from lineloom_core.mapping.site_view import RobotState
 from lineloom_core.mapping.tracker import Tracker
 from lineloom_core.scan import Mount
@@ -42,3 +43,19 @@ class RobotRecord:
     unplaced: int = 0
     placed: list[PlacedScan] = field(default_factory=list)
     latest: PlacedScan | None = None
+    doctor: SensorDoctor = field(default_factory=SensorDoctor)
+    distrusted: str = ""
+    """Why nothing of its session may be joined with other maps; empty where all is well."""
+
+    def trust_again(self) -> None:
+        """Begin anew: the lidar was mounted otherwise, or its driver restarted."""
+        self.doctor, self.distrusted = SensorDoctor(), ""
+
+    @property
+    def health(self) -> tuple[str, ...]:
+        """What an operator should know, in plain words, the worst first."""
+        findings = tuple(str(finding) for finding in self.doctor.findings())
+        if not self.distrusted:
+            return findings
+        apart = f"not-joined: this robot's map stays by itself because of {self.distrusted}"
+        return (*findings, apart)

@@ -24,6 +24,7 @@ from lineloom_core.mapping.constraint import Constraint
 from lineloom_core.mapping.explain import explain
 from lineloom_core.mapping.front_end import take
 from lineloom_core.mapping.history import History
+from lineloom_core.mapping.keyframe import Keyframe
 from lineloom_core.mapping.localisation import Localisation
 from lineloom_core.mapping.localise import localise
 from lineloom_core.mapping.memory import Memory
@@ -37,7 +38,7 @@ from lineloom_core.mapping.view_builder import build_view
 from lineloom_core.mapping.what_if import what_if
 from lineloom_core.scan import Mount, Scan
 
-SNAPSHOT_FORMAT = 4
+SNAPSHOT_FORMAT = 5
 
 
 class SnapshotError(ValueError):
@@ -82,6 +83,8 @@ class SiteMapper:
         taken = take(self._config, self._history, record, scan, self._version)
         if taken.keyframe is None:
             return Changes(placed=taken.placed)
+        if taken.distrusted:
+            return self._set_apart(robot, taken.keyframe)
         became = advance(self._site, taken.keyframe)
         if became.contradicted:
             self._rebuild(self._site.verdicts.withdraw(became.contradicted))
@@ -100,6 +103,7 @@ class SiteMapper:
         record = self._robots.setdefault(robot, RobotRecord(robot))
         if record.mount.inverted != mount.inverted:
             record.tracker = None
+            record.trust_again()
         record.mount = mount
 
     def forget(self, robot: str) -> None:
@@ -189,6 +193,23 @@ class SiteMapper:
         mapper._memory, mapper._history, mapper._site = memory, history, site
         mapper._robots, mapper._version = robots, version
         return mapper
+
+    def _set_apart(self, robot: str, keyframe: Keyframe) -> Changes:
+        """Go through the history again without places of a robot whose lidar is certainly wrong."""
+        frames = self._history.keyframes
+        tied = {
+            c.id
+            for c in self._site.constraints.values()
+            if c.state == "accepted"
+            and c.kind == "rendezvous"
+            and robot in (frames[c.keyframe_a].robot, frames[c.keyframe_b].robot)
+        }
+        self._rebuild(self._site.verdicts)
+        kept = self._site.constraints
+        withdrawn = (i for i in sorted(tied) if i not in kept or kept[i].state != "accepted")
+        return Changes(
+            placed=True, keyframe=keyframe.id, withdrawn=tuple(withdrawn), optimised=True
+        )
 
     def _find(self, constraint: str) -> Constraint | None:
         return self._site.verdicts.barred(constraint) or self._site.constraints.get(constraint)

@@ -100,6 +100,11 @@ class Tracker:
         if self._recent:
             self._map = LocalMap.build(reversed(self._recent))
 
+    @property
+    def turn_rate(self) -> float:
+        """Turn rate of the last step [rad/s], 0 where it is not known."""
+        return float(self._twist[2])
+
     @timed("track")
     def track(
         self, features: ScanFeatures, cloud: Cloud, stamp: float, odometry: Pose | None = None

@@ -76,6 +76,7 @@ def _robot(site: SiteMap, record: RobotRecord, component_of: dict[int, str]) -> 
         latest_stamp=record.stamp,
         latest_session=record.session,
         latest_seq=record.seq,
+        health=record.health,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,8 @@ from lineloom_core.geometry import Pose
 from lineloom_core.scan import Scan
 from lineloom_core.simulation.world import World
 
+_SWEEP_PARTS = 40
+
 
 @dataclass(frozen=True, slots=True)
 class Lidar:
@@ -20,7 +23,8 @@ class Lidar:
     angle_min, angle_increment: as in `Scan` [rad]. range_min, range_max: [m]. range_sigma: standard
     deviation of the range noise [m], redrawn beyond +-range_clip [m]. angle_sigma: standard
     deviation of each beam's true direction about its nominal one [rad]. dropout: probability that
-    a beam returns nothing. rate_hz: sweeps per second. Raises ValueError for impossible values.
+    a beam returns nothing. rate_hz: sweeps per second. time_increment: from beam to beam [s], 0 =
+    all at once. Raises ValueError for impossible values.
     """
 
     angle_min: float
@@ -33,6 +37,7 @@ class Lidar:
     angle_sigma: float = 0.0
     dropout: float = 0.0
     rate_hz: float = 5.0
+    time_increment: float = 0.0
 
     def __post_init__(self) -> None:
         if self.beams < 1 or self.angle_increment == 0.0:
@@ -43,6 +48,8 @@ class Lidar:
             raise ValueError("noise must not be negative and range_clip must be positive")
         if not 0.0 <= self.dropout <= 1.0 or self.rate_hz <= 0.0:
             raise ValueError("dropout must lie in [0, 1] and rate_hz must be positive")
+        if not 0.0 <= self.time_increment * self.beams <= 1.0 / self.rate_hz + 1e-9:
+            raise ValueError("a sweep's beams must fit into the time of a sweep")
 
     @property
     def angles(self) -> NDArray[np.float64]:
@@ -84,13 +91,21 @@ class Lidar:
         odometry: Pose | None = None,
         inverted: bool = False,
         disks: NDArray[np.float64] | None = None,
+        pose_after: Callable[[float], Pose] | None = None,
     ) -> Scan:
         """Measure one sweep from T_world_laser = `pose`; see `exact_ranges` for the rest.
 
-        The sweep is instantaneous: a moving robot does not skew it.
+        pose_after: T_world_laser so many seconds into the sweep. Given that and a `time_increment`,
+        a moving robot skews its scan; else the sweep is instantaneous.
         """
         errors = self.angle_sigma * rng.standard_normal(self.beams) if self.angle_sigma else None
         ranges = self.exact_ranges(world, pose, inverted=inverted, disks=disks, angle_errors=errors)
+        if pose_after is not None and self.time_increment:
+            for part in np.array_split(np.arange(self.beams), _SWEEP_PARTS)[1:]:
+                there = pose_after(float(part.mean()) * self.time_increment)
+                ranges[part] = self.exact_ranges(
+                    world, there, inverted=inverted, disks=disks, angle_errors=errors
+                )[part]
         hit = np.isfinite(ranges)
         noise = _clipped_noise(rng, self.beams, self.range_sigma, self.range_clip)
         ranges[hit] = np.maximum(ranges[hit] + noise[hit], 0.0)
@@ -105,6 +120,7 @@ class Lidar:
             stamp=stamp,
             seq=seq,
             session=session,
+            time_increment=self.time_increment,
             scan_time=1.0 / self.rate_hz,
             odometry=odometry,
         )

@@ -168,5 +168,6 @@ class SimulatedRobot:
             odometry=believed,
             inverted=self.mount.inverted,
             disks=disks_in_view(self.blockers, time_s, laser.x, laser.y, ROBOT_RADIUS_M),
+            pose_after=lambda s: self.drive.pose_at(time_s + s) @ self.mount.T_base_laser,
         )
         return SimulatedScan(self.name, scan, laser, time_s)

@@ -1,0 +1,193 @@
+"""Walls that come out bent: a wrong angle increment, or turning during the sweep.
+
+If beams lie k times as far apart as is claimed (k = 1 - epsilon or so), a straight wall at distance
+d is drawn through points that are off towards the lidar by epsilon * d * alpha * tan(alpha), alpha
+being the claimed bearing from the wall's foot point. That holds for all walls with the same sign
+and epsilon; real curves (columns, round halls) do not share one. A robot that turns at omega
+during a sweep of rate Omega does the same to a scan, with epsilon = -omega / Omega: a wrong
+increment is what remains without turning, skew what grows with it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lineloom_core.features import ScanFeatures
+from lineloom_core.features._circle_kernels import ARC, RADIUS, SENSE
+from lineloom_core.features._kernels import FIRST, LAST, LENGTH, OFFSET, THETA
+from lineloom_core.health.finding import Finding
+from lineloom_core.health.sample import Sample
+
+_LEAST_LENGTH_M = 0.5
+_LEAST_POINTS = 10
+_LEAST_DISTANCE_M = 0.3
+_STEEPEST_RAD = math.radians(75.0)
+_LEAST_LEVERAGE_M2, _MOST_LEVERAGE_M2 = 0.02, 2.0
+_STEP_M, _STEP_RAD = 0.2, math.radians(6.0)
+_MEMORY = 400
+_LEAST_SCANS = 40.0
+_STILL, _TURNING = 0.15, 0.35
+_LEAST_EPSILON = 0.03
+_LEAST_SKEW_S = 0.02
+_SIGNIFICANT = 5.0
+_LINEAR = 0.25
+_MOST_SPREAD = 0.5
+_LEAST_ROUND_M, _LEAST_ROUND_ARC, _ROUND_SHARE, _ROUND_SPREAD = 1.0, 0.5, 0.3, 0.05
+
+
+@dataclass
+class BendingCheck:
+    """The last scans: rows epsilon, leverage [m^2], turn rate [rad/s]; radii of round walls [m]."""
+
+    bends: deque[tuple[float, float, float]] = field(default_factory=lambda: deque(maxlen=_MEMORY))
+    rounds: deque[float] = field(default_factory=lambda: deque(maxlen=_MEMORY))
+    since_m: float = 0.0
+    since_rad: float = 0.0
+    increment: float = 0.0
+
+    def examine(self, sample: Sample) -> None:
+        """Measure the next scan once the robot has moved on."""
+        self.since_m += sample.moved_m
+        self.since_rad += abs(sample.turned_rad)
+        rate = sample.turn_rate
+        if rate is None or (self.since_m < _STEP_M and self.since_rad < _STEP_RAD):
+            return
+        self.since_m = self.since_rad = 0.0
+        self.increment = sample.scan.angle_increment
+        self.rounds.append(_round_wall(sample.features))
+        bend = bend_of(sample.features)
+        if bend is not None:
+            self.bends.append((*bend, rate))
+
+    def findings(self) -> list[Finding]:
+        """What is wrong now."""
+        rows = np.array(self.bends).reshape(-1, 3)
+        weights = np.minimum(rows[:, 1], _MOST_LEVERAGE_M2)
+        still = np.abs(rows[:, 2]) < _STILL
+        epsilon = _robust(rows[still, 0], weights[still])
+        if epsilon.scans < _LEAST_SCANS or self._is_round():
+            return []
+        found = []
+        if epsilon.stands_out(_LEAST_EPSILON):
+            found.append(_wrong_increment(epsilon.value, self.increment))
+        turning = np.abs(rows[:, 2]) > _TURNING
+        rates = rows[turning, 2]
+        skew = _robust((rows[turning, 0] - epsilon.value) / rates, weights[turning] * rates**2)
+        if skew.scans >= _LEAST_SCANS and skew.stands_out(_LEAST_SKEW_S):
+            found.append(_skew(abs(skew.value), self.increment))
+        return found
+
+    def _is_round(self) -> bool:
+        """Whether the walls are round indeed: such a wall has the same radius from everywhere."""
+        radii = np.array([radius for radius in self.rounds if radius > 0.0])
+        if len(radii) < _ROUND_SHARE * len(self.rounds) or len(radii) == 0:
+            return False
+        middle = float(np.median(radii))
+        return float(np.median(np.abs(radii - middle))) < _ROUND_SPREAD * middle
+
+
+@dataclass(frozen=True, slots=True)
+class _Robust:
+    """A weighted median, its spread (as a standard deviation) and for how many scans it speaks."""
+
+    value: float
+    spread: float
+    scans: float
+
+    def stands_out(self, least: float) -> bool:
+        """Whether the value is large, beyond chance, and much the same from scan to scan."""
+        error = 1.25 * self.spread / math.sqrt(self.scans)
+        size = abs(self.value)
+        return (
+            size > max(least, _SIGNIFICANT * error)
+            and self.spread < _MOST_SPREAD * size + 0.5 * least
+        )
+
+
+def _robust(values: NDArray[np.float64], weights: NDArray[np.float64]) -> _Robust:
+    if len(values) == 0:
+        return _Robust(0.0, math.inf, 0.0)
+    middle = _weighted_median(values, weights)
+    spread = 1.4826 * _weighted_median(np.abs(values - middle), weights)
+    return _Robust(middle, spread, float(weights.sum() ** 2 / np.sum(weights**2)))
+
+
+def _weighted_median(values: NDArray[np.float64], weights: NDArray[np.float64]) -> float:
+    order = np.argsort(values, kind="stable")
+    below = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(below, 0.5 * below[-1])])
+
+
+def _round_wall(features: ScanFeatures) -> float:
+    """Radius [m] of the longest arc seen from inside; 0 where there is none."""
+    circles = features.circles
+    is_room = (circles[:, SENSE] < 0) & (circles[:, ARC] > _LEAST_ROUND_ARC)
+    inside = circles[is_room & (circles[:, RADIUS] > _LEAST_ROUND_M)]
+    return float(inside[np.argmax(inside[:, ARC]), RADIUS]) if len(inside) else 0.0
+
+
+def bend_of(features: ScanFeatures) -> tuple[float, float] | None:
+    """Return epsilon of a scan, by how much its increment is too large, and its leverage [m^2].
+
+    The variance of epsilon is that of the points across the walls over the leverage. None where no
+    wall is seen long and wide enough to tell.
+    """
+    above = below = 0.0
+    for line in features.lines[features.lines[:, LENGTH] >= _LEAST_LENGTH_M]:
+        shape = _bulge(features, line)
+        if shape is not None:
+            above += shape[0]
+            below += shape[1]
+    return (above / below, below) if below >= _LEAST_LEVERAGE_M2 else None
+
+
+def _bulge(features: ScanFeatures, line: NDArray[np.float64]) -> tuple[float, float] | None:
+    """One wall's share in the least-squares fit of epsilon: numerator and denominator [m^2]."""
+    a, b = np.searchsorted(features.beams, [line[FIRST], line[LAST] + 1])
+    distance = -line[OFFSET]
+    if b - a < _LEAST_POINTS or distance < _LEAST_DISTANCE_M:
+        return None
+    c, s = math.cos(line[THETA]), math.sin(line[THETA])
+    points = features.points[a:b]
+    along = c * points[:, 0] + s * points[:, 1]
+    towards = c * points[:, 1] - s * points[:, 0] + distance
+    bearing = np.arctan2(along, distance)
+    flat = np.abs(bearing) < _STEEPEST_RAD
+    if np.count_nonzero(flat) < _LEAST_POINTS:
+        return None
+    along, towards, bearing = along[flat], towards[flat], bearing[flat]
+    basis = np.column_stack([np.ones(len(along)), along - along.mean()])
+    both = np.column_stack([bearing * along, towards])
+    fitted, *_ = np.linalg.lstsq(basis, both, rcond=None)
+    shape, measured = (both - basis @ fitted).T
+    return float(shape @ measured), float(shape @ shape)
+
+
+def _wrong_increment(epsilon: float, increment: float) -> Finding:
+    way = "large" if epsilon > 0.0 else "small"
+    if abs(epsilon) <= _LINEAR:
+        by = f"about {100 * abs(epsilon):.0f} % too {way}; it should be near "
+        by += f"{increment / (1.0 + epsilon):.5f} rad"
+    else:
+        by = f"far too {way}, by a quarter or more"
+    return Finding(
+        "angle-increment",
+        "error",
+        f"straight walls come out bent: angle_increment {increment:.5f} rad is {by}, or the count "
+        "of ranges is not what the driver thinks",
+    )
+
+
+def _skew(seconds_per_rad: float, increment: float) -> Finding:
+    return Finding(
+        "skew",
+        "warning",
+        f"scans are bent while the robot turns: a sweep takes {seconds_per_rad * math.tau:.2f} s "
+        "per turn and the robot turns meanwhile; send time_increment (about "
+        f"{1e6 * seconds_per_rad * abs(increment):.0f} microseconds) and it is corrected",
+    )

@@ -1,0 +1,109 @@
+"""All checks of one robot's sensor.
+
+Steps for every scan: 1. `prepared`: what is known to be wrong and can be mended is mended (skew
+from turning where the driver times its beams, beams that see the robot itself); 2. the scan is
+mapped; 3. `examine`: every check looks at the scan and at how the robot moved.
+
+The doctor is silent where nothing can be known. A mirrored lidar alone makes a consistent map:
+only odometry or other robots' maps can tell. A frozen clock does not bend a map.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+
+from lineloom_core.features import ScanFeatures
+from lineloom_core.geometry import Pose
+from lineloom_core.health.beams import BeamCheck
+from lineloom_core.health.bending import BendingCheck
+from lineloom_core.health.clock import ClockCheck, FrozenCheck
+from lineloom_core.health.finding import Finding
+from lineloom_core.health.sample import Sample
+from lineloom_core.health.turning import TurningCheck
+from lineloom_core.health.units import UnitsCheck
+from lineloom_core.scan import Scan
+
+
+class Check(Protocol):
+    """One thing that may be wrong."""
+
+    def examine(self, sample: Sample) -> None:
+        """Look at the next scan."""
+
+    def findings(self) -> list[Finding]:
+        """What is wrong now."""
+        ...
+
+
+@dataclass
+class SensorDoctor:
+    """The state of all checks: deterministic, picklable, a few kilobytes."""
+
+    units: UnitsCheck = field(default_factory=UnitsCheck)
+    clock: ClockCheck = field(default_factory=ClockCheck)
+    frozen: FrozenCheck = field(default_factory=FrozenCheck)
+    turning: TurningCheck = field(default_factory=TurningCheck)
+    beams: BeamCheck = field(default_factory=BeamCheck)
+    bending: BendingCheck = field(default_factory=BendingCheck)
+    _pose: Pose | None = None
+    _track: int | None = None
+    _odometry: Pose | None = None
+    _stamp: float | None = None
+
+    def prepared(self, scan: Scan) -> Scan:
+        """Return a scan, counter-clockwise, without what is known to be false in it."""
+        own = self.beams.own
+        if own is None or len(own) != len(scan) or not own.any():
+            return scan
+        ranges = np.where(own, np.nan, scan.ranges)
+        ranges.setflags(write=False)
+        return replace(scan, ranges=ranges)
+
+    def examine(
+        self, scan: Scan, features: ScanFeatures, pose: Pose | None, track: int | None
+    ) -> None:
+        """Look at a scan as it came, counter-clockwise.
+
+        features: of the scan as it was mapped. pose: T_track_laser in the track of that number,
+        None where tracking failed.
+        """
+        step = odometry_step = None
+        if pose is not None and self._pose is not None and track == self._track:
+            step = self._pose.between(pose)
+            if scan.odometry is not None and self._odometry is not None:
+                odometry_step = self._odometry.between(scan.odometry)
+        elapsed = 0.0 if self._stamp is None else scan.stamp - self._stamp
+        sample = Sample(scan, features, step, odometry_step, elapsed)
+        for check in self._checks():
+            check.examine(sample)
+        self._pose, self._track = pose, track
+        self._odometry, self._stamp = scan.odometry, scan.stamp
+
+    def findings(self) -> tuple[Finding, ...]:
+        """What is wrong now, errors first."""
+        found = [finding for check in self._checks() for finding in check.findings()]
+        order = {"error": 0, "warning": 1, "note": 2}
+        return tuple(sorted(found, key=lambda finding: order[finding.severity]))
+
+    @property
+    def trustworthy(self) -> bool:
+        """Whether the geometry may be right: false once it is certainly wrong."""
+        return all(finding.severity != "error" for finding in self.findings())
+
+    def _checks(self) -> tuple[Check, ...]:
+        return self.units, self.clock, self.frozen, self.turning, self.beams, self.bending
+
+
+def without_skew(scan: Scan, turn_rate: float, *, inverted: bool = False) -> Scan:
+    """Return a scan as if the robot had stood still at the time of its first beam.
+
+    Turning at `turn_rate` [rad/s] during the sweep shifts beam i by i * time_increment * turn_rate:
+    which is another increment, no more. Unchanged where the beams are not timed.
+    """
+    if scan.time_increment <= 0.0 or turn_rate == 0.0:
+        return scan
+    shift = turn_rate * scan.time_increment
+    return replace(scan, angle_increment=scan.angle_increment + (-shift if inverted else shift))

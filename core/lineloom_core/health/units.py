@@ -1,0 +1,73 @@
+"""Ranges in a wrong unit, and lidars that see nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lineloom_core.health.finding import Finding
+from lineloom_core.health.sample import Sample
+
+_SCANS = 10
+_BLIND_SCANS = 20
+_FAR_M = 100.0
+_NEAR_M = 0.2
+_BLIND_SHARE = 0.02
+
+
+@dataclass
+class UnitsCheck:
+    """Counts scans in a row that are too large, too small or empty. No room measures 100 m across
+    for half of all beams, ten scans long; a lidar indoors never sees nothing for long."""
+
+    huge: int = 0
+    tiny: int = 0
+    blind: int = 0
+    median_m: float = 0.0
+
+    def examine(self, sample: Sample) -> None:
+        """Look at the next scan."""
+        ranges = sample.scan.ranges
+        seen = ranges[np.isfinite(ranges)]
+        if len(seen) < _BLIND_SHARE * len(ranges) or len(seen) == 0:
+            self.blind, self.huge, self.tiny = self.blind + 1, 0, 0
+            return
+        self.blind = 0
+        self.median_m = float(np.median(seen))
+        self.huge = self.huge + 1 if self.median_m > _FAR_M else 0
+        covered = len(seen) > 0.8 * len(ranges) and float(seen.max()) < _NEAR_M
+        self.tiny = self.tiny + 1 if covered else 0
+
+    def findings(self) -> list[Finding]:
+        """What is wrong now."""
+        if self.huge >= _SCANS:
+            return [
+                Finding(
+                    "units",
+                    "error",
+                    f"half of all returns are farther than {self.median_m:.0f} m: ranges are in "
+                    "millimetres, it seems; send metres (divide ranges, range_min and range_max "
+                    "by 1000)",
+                )
+            ]
+        if self.tiny >= _SCANS:
+            return [
+                Finding(
+                    "units",
+                    "error",
+                    f"everything is nearer than {_NEAR_M:.1f} m in every direction: the lidar is "
+                    "covered, or ranges are not in metres",
+                )
+            ]
+        if self.blind >= _BLIND_SCANS:
+            return [
+                Finding(
+                    "no-returns",
+                    "warning",
+                    f"the last {self.blind} scans hold no returns: all ranges are invalid or "
+                    "beyond range_max; if ranges are in millimetres, send metres; else look at "
+                    "the lidar",
+                )
+            ]
+        return []
