@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-from dataclasses import replace
+from typing import Annotated
 
+from fastapi import Query
+from lineloom.wire.export import MapFrame
 from lineloom_core.floorplan.alignment import aligning
 from lineloom_core.geometry import Pose
-from lineloom_core.io.reframe import in_frames
+from lineloom_core.io.reframe import in_frames, only
 from lineloom_core.mapping.site_view import SiteView
 
 from lineloom_service.errors import (
@@ -20,6 +22,11 @@ from lineloom_service.floorplans import lines_of
 from lineloom_service.map_files import FramedView, ray_source
 from lineloom_service.service import Service
 from lineloom_service.store.records import SiteRecord
+
+AlignQuery = Annotated[bool, Query(description="Turned so that walls run along the axes.")]
+FrameQuery = Annotated[
+    MapFrame, Query(description="In the map's own coordinates, or the floor plan's.")
+]
 
 
 async def in_frame(
@@ -65,9 +72,4 @@ async def _in_plan(
     if not frames:
         why = "; ".join(f"{name}: {p.reason}" for name, p in placed.items()) or "nothing is mapped"
         raise ProblemError(NOT_REGISTERED, why)
-    shown = replace(
-        view,
-        components=tuple(c for c in view.components if c.id in frames),
-        lines=tuple(w for w in view.lines if w.component in frames),
-    )
-    return FramedView(in_frames(shown, frames), frames)
+    return FramedView(in_frames(only(view, frames), frames), frames)

@@ -76,6 +76,9 @@ async def test_frames_that_there_are_not(client: httpx.AsyncClient) -> None:
     expect_problem(await client.get(f"{SITE}/map?frame=plan"), 404, "no-floor-plan")
     expect_problem(await client.get(f"{SITE}/map?frame=plan&align=true"), 422, "invalid-parameter")
     aligned = (await client.get(f"{SITE}/map?align=true")).json()
+    for path in ("robots/a/trajectory", "graph"):
+        expect_problem(await client.get(f"{SITE}/{path}?frame=plan"), 404, "no-floor-plan")
+        assert (await client.get(f"{SITE}/{path}?align=true")).status_code == 200
     # Its walls run along the axes already.
     assert all(line["y1"] == pytest.approx(line["y2"]) for line in aligned["lines"])
 

@@ -7,6 +7,7 @@ import math
 import zipfile
 from pathlib import Path
 
+import httpx
 import numpy as np
 import pytest
 import yaml
@@ -50,6 +51,13 @@ def test_a_mapped_office_is_served_in_its_floor_plans_coordinates(tmp_path: Path
             cells = np.floor((way - about["origin"][:2]) / about["resolution"]).astype(int)
             free = grey[cells[:, 1], cells[:, 0]] == 254
             assert free.mean() > 0.97
+            # And so is every pose.
+            path = f"{service.url}/v1/sites/office/robots/{robot.name}/trajectory?frame=plan"
+            poses = httpx.get(path, trust_env=False).json()["poses"]
+            driven = np.array([s.true_pose.to_array() for s in robot.scans()])
+            placed = np.array([(p["x"], p["y"]) for p in poses])
+            rows = [p["seq"] for p in poses]
+            assert np.hypot(*(placed - driven[rows, :2]).T).max() < 0.25
             found = client.floorplan_differences("office")
             assert sum(math.hypot(p.x2 - p.x1, p.y2 - p.y1) for p in found.missing) < 3.0
             assert b"pieces of wall" in client.floorplan_drawing("office")

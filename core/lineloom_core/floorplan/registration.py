@@ -69,7 +69,21 @@ def judge_of(plan: FloorPlan, lines: NDArray[np.float64], grid: OccupancyGrid) -
 
 
 def register(plan: FloorPlan, lines: NDArray[np.float64], grid: OccupancyGrid) -> Registration:
-    """Find the map in the plan. lines (n, 4) and grid in the map's frame [m]."""
+    """Find the map in the plan. lines (n, 4) and grid in the map's frame [m].
+
+    A map that has no place is tried against the plan's mirror image too, to say so if that is it.
+    """
+    found = _search(plan, lines, grid)
+    if found.verdict != "none" or found.best is None:
+        return found
+    mirrored = FloorPlan.of(plan.lines * np.array([1.0, -1.0, 1.0, -1.0]))
+    if _search(mirrored, lines, grid).verdict != "registered":
+        return found
+    advice = "mirrored it would fit: is the plan drawn mirrored, or the lidar upside down?"
+    return replace(found, reason=f"{found.reason}; {advice}")
+
+
+def _search(plan: FloorPlan, lines: NDArray[np.float64], grid: OccupancyGrid) -> Registration:
     if not _ODD_EXTENT_M[0] <= plan.extent <= _ODD_EXTENT_M[1]:
         return _none(f"the plan measures {plan.extent:.4g} m: is it in metres?")
     judge = judge_of(plan, lines, grid)

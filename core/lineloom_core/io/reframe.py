@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -32,6 +32,34 @@ def in_frames(view: SiteView, frames: Mapping[str, Pose]) -> SiteView:
         trajectories={name: _trajectory(t, frames) for name, t in view.trajectories.items()},
         lines=tuple(_line(line, frames) for line in view.lines),
         keyframes=tuple(_keyframe(keyframe, frames) for keyframe in view.keyframes),
+    )
+
+
+def only(view: SiteView, components: Collection[str]) -> SiteView:
+    """Return what the view knows of some components, and of nothing else."""
+    keyframes = tuple(k for k in view.keyframes if k.component in components)
+    known = {k.id for k in keyframes}
+    return replace(
+        view,
+        robots={n: r for n, r in view.robots.items() if r.component in components},
+        components=tuple(c for c in view.components if c.id in components),
+        trajectories={n: _rows_in(t, components) for n, t in view.trajectories.items()},
+        lines=tuple(w for w in view.lines if w.component in components),
+        keyframes=keyframes,
+        constraints=tuple(
+            c for c in view.constraints if c.keyframe_a in known and c.keyframe_b in known
+        ),
+    )
+
+
+def _rows_in(trajectory: TrajectoryView, components: Collection[str]) -> TrajectoryView:
+    rows = [i for i, name in enumerate(trajectory.component) if name in components]
+    return TrajectoryView(
+        session=tuple(trajectory.session[i] for i in rows),
+        seq=trajectory.seq[rows],
+        stamp=trajectory.stamp[rows],
+        component=tuple(trajectory.component[i] for i in rows),
+        poses=trajectory.poses[rows],
     )
 
 

@@ -11,7 +11,8 @@ from lineloom_core.io import g2o
 
 from lineloom_service.answers import answer, format_choice, unknown_format
 from lineloom_service.convert import to_graph
-from lineloom_service.dependencies import CurrentView, KnownSite
+from lineloom_service.dependencies import CurrentView, KnownSite, ServiceDep
+from lineloom_service.map_frames import AlignQuery, FrameQuery, in_frame
 from lineloom_service.openapi import also_as
 
 FORMATS = ("json", "g2o")
@@ -21,9 +22,18 @@ router = APIRouter(tags=["graph"])
 
 @router.get("/v1/sites/{site}/graph", response_model=wire.Graph, responses=also_as("text/plain"))
 async def get_graph(
-    site: KnownSite, view: CurrentView, format: Annotated[str, format_choice(FORMATS)] = "json"
+    site: KnownSite,
+    view: CurrentView,
+    service: ServiceDep,
+    format: Annotated[str, format_choice(FORMATS)] = "json",
+    align: AlignQuery = False,
+    frame: FrameQuery = "map",
 ) -> Response:
-    """Return keyframes and accepted constraints: `format` is json (node-link) or g2o."""
+    """Return keyframes and accepted constraints: `format` is json (node-link) or g2o.
+
+    In the floor plan's frame: those of components that have a place there.
+    """
+    view = (await in_frame(service, site, view, align=align, frame=frame)).view
     if format == "json":
         return answer(await asyncio.to_thread(to_graph, site.name, view))
     if format == "g2o":

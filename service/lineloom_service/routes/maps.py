@@ -17,7 +17,7 @@ from lineloom_service.answers import JSON, format_choice, matches, unknown_forma
 from lineloom_service.dependencies import CurrentView, KnownSite, ServiceDep
 from lineloom_service.errors import INVALID_PARAMETER, UNKNOWN_COMPONENT, ProblemError
 from lineloom_service.map_files import FORMATS, read_bbox, render_map
-from lineloom_service.map_frames import in_frame
+from lineloom_service.map_frames import AlignQuery, FrameQuery, in_frame
 from lineloom_service.openapi import also_as
 from lineloom_service.service import Service
 from lineloom_service.store.records import SiteRecord
@@ -42,8 +42,8 @@ async def get_map(
     format: Annotated[str, format_choice(FORMATS)] = "json",
     component: Annotated[str | None, Query(description="Only this component.")] = None,
     bbox: Annotated[str | None, Query(description="x_min,y_min,x_max,y_max in metres.")] = None,
-    align: Annotated[bool, Query(description="Turned so that walls run along the axes.")] = False,
-    frame: Annotated[MapFrame, Query(description="In which coordinates.")] = "map",
+    align: AlignQuery = False,
+    frame: FrameQuery = "map",
     resolution: Annotated[
         float | None, Query(gt=0.0, le=10.0, description="Metres a cell, for nav2.")
     ] = None,

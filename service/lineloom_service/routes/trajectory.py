@@ -13,7 +13,8 @@ from lineloom_core.mapping.site_view import TrajectoryView
 
 from lineloom_service.answers import answer, format_choice, unknown_format
 from lineloom_service.convert import to_trajectory
-from lineloom_service.dependencies import CurrentView, KnownRobot
+from lineloom_service.dependencies import CurrentView, KnownRobot, KnownSite, ServiceDep
+from lineloom_service.map_frames import AlignQuery, FrameQuery, in_frame
 from lineloom_service.openapi import also_as
 
 router = APIRouter(tags=["robots"])
@@ -37,11 +38,19 @@ _TEXT = {
     responses=also_as("text/plain", "text/csv"),
 )
 async def get_trajectory(
+    site: KnownSite,
     robot: KnownRobot,
     view: CurrentView,
+    service: ServiceDep,
     format: Annotated[str, format_choice(("json", *_TEXT))] = "json",
+    align: AlignQuery = False,
+    frame: FrameQuery = "map",
 ) -> Response:
-    """Return the pose of every processed scan: `format` is json, tum or csv."""
+    """Return the pose of every processed scan: `format` is json, tum or csv.
+
+    In the floor plan's frame: of scans in components that have a place there.
+    """
+    view = (await in_frame(service, site, view, align=align, frame=frame)).view
     if format == "json":
         return answer(to_trajectory(robot.name, view))
     if format not in _TEXT:

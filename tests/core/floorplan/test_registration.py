@@ -125,6 +125,13 @@ def test_another_buildings_plan_is_refused(office_map: Survey, seed: int) -> Non
         assert answer.reason
 
 
+def test_a_mirrored_plan_is_told(office: World, office_map: Survey) -> None:
+    answer = found(office.walls * np.array([-1.0, 1.0, -1.0, 1.0]), office_map)
+    assert answer.verdict == "none"
+    assert answer.T_plan_map is None
+    assert "mirrored it would fit" in answer.reason
+
+
 def test_a_plan_in_millimetres_is_asked_about(office: World, office_map: Survey) -> None:
     answer = found(office.walls * 1000.0, office_map)
     assert answer.verdict == "none"

@@ -22,7 +22,7 @@ from ezdxf.audit import Auditor
 from ezdxf.filemanagement import read as read_dxf
 from lineloom_core.geometry import Pose
 from lineloom_core.io import csv, dxf, geojson, ieee1873, png, svg, tum
-from lineloom_core.io.reframe import in_frames
+from lineloom_core.io.reframe import in_frames, only
 from lineloom_core.io.selection import UnknownComponentError, clip
 from lineloom_core.mapping.site_view import MapLine, SiteView
 from numpy.typing import NDArray
@@ -168,6 +168,19 @@ def test_frames_move_everything_and_back(site_view: SiteView) -> None:
     back = in_frames(moved, {"c1": T.inverse()})
     np.testing.assert_allclose(ends(back.lines), ends(site_view.lines), atol=1e-12)
     assert in_frames(site_view, {}) is site_view
+
+
+def test_only_some_components(site_view: SiteView) -> None:
+    part = only(site_view, {"c3"})
+    assert [c.id for c in part.components] == ["c3"]
+    assert {w.component for w in part.lines} == {k.component for k in part.keyframes} == {"c3"}
+    assert list(part.robots) == ["carol"]
+    assert len(part.trajectories["carol"].poses) == 200
+    assert len(part.trajectories["alice"].poses) == 0
+    assert {c.id for c in part.constraints} == {"s20", "s21"}
+    both = only(site_view, {"c1", "c3"})
+    assert both.lines == site_view.lines
+    assert both.keyframes == site_view.keyframes
 
 
 @pytest.mark.parametrize("write", [dxf.write_map, csv.write_map, ieee1873.write_map])
