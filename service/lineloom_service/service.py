@@ -38,6 +38,7 @@ class Service:
             database_at(settings.database_url, settings.database_path),
             gap_window_s=settings.gap_window_s,
             max_held=settings.max_held,
+            group_limit=settings.group_limit,
         )
         self.engine: Engine = engine or LocalEngine(
             settings.workers, publish_every_s=settings.publish_every_s

@@ -52,6 +52,9 @@ class Settings(BaseSettings):
         default=20_000, ge=1, description="Log entries of a site waiting to be mapped before 429."
     )
 
+    group_limit: int = Field(
+        default=256, ge=1, description="Requests that may share a commit to the disk."
+    )
     gap_window_s: float = Field(
         default=2.0, ge=0.0, description="How long a scan waits for those before it."
     )

@@ -17,6 +17,7 @@ from pathlib import Path
 from lineloom_core.warm_up import warm_up
 
 from tests.benchmarks.drives import driving
+from tests.benchmarks.ingest import ingesting
 from tests.benchmarks.map_files import occupancy
 from tests.benchmarks.row import Row, table
 from tests.benchmarks.single_scans import extraction, matching
@@ -34,6 +35,9 @@ def measure(data: Path, *, quick: bool, http: bool) -> list[Row]:
     rows += matching(data, quick=quick)
     _tell("maps as files")
     rows += occupancy(quick=quick)
+    if http:
+        _tell("ingest")
+        rows += ingesting(quick=quick)
     if not (data / "mit-csail").is_dir():
         _tell(f"no drives and no real pairs: {data} is missing")
         return rows

@@ -24,7 +24,6 @@ T = TypeVar("T")
 Action = Callable[[Transaction], T]
 
 _LOG = logging.getLogger(__name__)
-_GROUP_LIMIT = 256
 _RETRY_S = 1.0
 
 
@@ -57,15 +56,17 @@ class GroupCommit:
     """
 
     def __init__(
-        self, database: Database, window_s: float, max_held: int, listener: CommitListener
+        self, database: Database, ledger: Ledger, limit: int, listener: CommitListener
     ) -> None:
+        """limit: actions that share a transaction at most."""
         self._database = database
         self._listener = listener
         self._jobs: deque[_Job] = deque()
         self._wake = asyncio.Event()
         self._closing = False
         self._deadline: float | None = None
-        self._ledger = Ledger(window_s, max_held)
+        self._ledger = ledger
+        self._limit = limit
         self._task: asyncio.Task[None] | None = None
         self.revision = -1
         """The clock's, up to which the listener has been told of everything."""
@@ -107,7 +108,7 @@ class GroupCommit:
     async def _run(self) -> None:
         while self._jobs or not self._closing:
             await self._wait()
-            jobs = [self._jobs.popleft() for _ in range(min(len(self._jobs), _GROUP_LIMIT))]
+            jobs = [self._jobs.popleft() for _ in range(min(len(self._jobs), self._limit))]
             try:
                 outcome = await self._commit([job.action for job in jobs])
             except Exception as error:

@@ -17,6 +17,7 @@ from lineloom_service.store import actions, files, questions, reads
 from lineloom_service.store.database import Claim, Database, Work
 from lineloom_service.store.files import FileKind, FileRecord
 from lineloom_service.store.group_commit import GroupCommit
+from lineloom_service.store.ledger import Ledger
 from lineloom_service.store.protocol import NEWS, CommitListener, NewsListener
 from lineloom_service.store.records import (
     ActionKind,
@@ -40,13 +41,16 @@ _LOG = logging.getLogger(__name__)
 class SqlStore:
     """Implements `store.protocol.Store` on a database."""
 
-    def __init__(self, database: Database, *, gap_window_s: float, max_held: int) -> None:
+    def __init__(
+        self, database: Database, *, gap_window_s: float, max_held: int, group_limit: int = 256
+    ) -> None:
         self.shared = database.shared
         self._database = database
         self._records: dict[str, SiteRecord] = {}
         self._listeners: list[CommitListener] = []
         self._news_listeners: list[NewsListener] = []
-        self._writer = GroupCommit(database, gap_window_s, max_held, self._on_commit)
+        ledger = Ledger(gap_window_s, max_held)
+        self._writer = GroupCommit(database, ledger, group_limit, self._on_commit)
         self._purge: asyncio.Task[None] | None = None
         self._refresh: asyncio.Task[None] | None = None
         self._term = 0
