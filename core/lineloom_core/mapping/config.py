@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from lineloom_core.features import ExtractionConfig
 from lineloom_core.fusion import FusionConfig
+from lineloom_core.fusion.persistence import PersistenceConfig
 from lineloom_core.mapping.tracker import TrackerConfig
 from lineloom_core.places.recognition import RecognitionConfig
 
@@ -78,5 +79,6 @@ class MapperConfig:
     closure: ClosureConfig = field(default_factory=ClosureConfig)
     join: JoinConfig = field(default_factory=JoinConfig)
     fusion: FusionConfig = field(default_factory=FusionConfig)
+    persistence: PersistenceConfig = field(default_factory=PersistenceConfig)
     least_fit_late: float = 0.6
     """Share of a late scan that must lie on its neighbours' surfaces."""

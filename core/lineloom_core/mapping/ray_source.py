@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from lineloom_core.fusion.occupancy import Rays
@@ -10,7 +12,11 @@ from lineloom_core.mapping.site_map import SiteMap
 
 def component_rays(site: SiteMap, component: str) -> Rays:
     """Return the rays of all keyframes of a component, in its map frame; none if there is none."""
-    members = [k for k in sorted(site.keyframes) if site.component_id(k) == component]
+    return rays_of(site, [k for k in sorted(site.keyframes) if site.component_id(k) == component])
+
+
+def rays_of(site: SiteMap, members: Sequence[int]) -> Rays:
+    """Return the rays of keyframes of one component, in its map frame and in the order given."""
     scans = [site.keyframes[k].scan for k in members]
     return Rays.of(
         [site.pose(k).to_array() for k in members],

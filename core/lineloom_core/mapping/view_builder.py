@@ -2,30 +2,22 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
-from lineloom_core.features._kernels import VAR_OFFSET
-from lineloom_core.fusion import LineObservations, fuse
-from lineloom_core.geometry import Pose
 from lineloom_core.geometry.angles import wrap_array
 from lineloom_core.graph import Covariances, in_map_axes
+from lineloom_core.mapping.map_lines import fused_lines
 from lineloom_core.mapping.robot_record import RobotRecord
 from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.mapping.site_view import (
     ComponentView,
     ConstraintView,
     KeyframeView,
-    MapLine,
     RobotView,
     SiteView,
     TrajectoryView,
 )
-
-_LINES_PER_KEYFRAME = 100_000
-"""Observation ids: keyframe times this plus the line's extraction number; stable for ever."""
 
 
 def build_view(site: SiteMap, robots: dict[str, RobotRecord], version: int) -> SiteView:
@@ -149,71 +141,3 @@ def _constraints(site: SiteMap) -> tuple[ConstraintView, ...]:
         )
         for c in known.values()
     )
-
-
-def fused_lines(site: SiteMap, component_of: dict[int, str]) -> tuple[MapLine, ...]:
-    """Fuse the lines of all keyframes, component by component (design §3 to §8)."""
-    members: dict[str, list[int]] = {}
-    for keyframe, component in component_of.items():
-        members.setdefault(component, []).append(keyframe)
-    names = sorted({k.robot for k in site.keyframes.values()})
-    lines: list[MapLine] = []
-    for component, keyframes in members.items():
-        lines.extend(_component_lines(site, component, keyframes, names))
-    return tuple(lines)
-
-
-def _component_lines(
-    site: SiteMap, component: str, keyframes: list[int], names: list[str]
-) -> list[MapLine]:
-    observations = _observations(site, keyframes, names)
-    if len(observations) == 0:
-        return []
-    fused = fuse(observations, site.config.fusion)
-    ends = fused.endpoints.tolist()
-    return [
-        MapLine(
-            id=f"l{fused.id[i]}",
-            component=component,
-            x1=ends[i][0],
-            y1=ends[i][1],
-            x2=ends[i][2],
-            y2=ends[i][3],
-            sigma=float(fused.sigma[i]),
-            support=int(fused.support[i]),
-            robots=tuple(names[r] for r in fused.robots[i]),
-            first_seen=float(fused.first_seen[i]),
-            last_seen=float(fused.last_seen[i]),
-        )
-        for i in range(len(fused))
-    ]
-
-
-def _observations(site: SiteMap, keyframes: list[int], names: list[str]) -> LineObservations:
-    """All keyframes' lines in the component's frame."""
-    rows = [(k, site.keyframes[k], site.keyframes[k].features.lines) for k in keyframes]
-    counts = np.array([len(lines) for _, _, lines in rows])
-    number = {name: i for i, name in enumerate(names)}
-    return LineObservations(
-        endpoints=np.concatenate([_moved(site.pose(k), lines) for k, _, lines in rows]),
-        sigma=np.sqrt(np.concatenate([lines[:, VAR_OFFSET] for _, _, lines in rows])),
-        weight=np.ones(int(counts.sum())),
-        keyframe=np.repeat(np.array([k for k, _, _ in rows], dtype=np.int64), counts),
-        robot=np.repeat(np.array([number[f.robot] for _, f, _ in rows], dtype=np.int64), counts),
-        stamp=np.repeat(np.array([f.scan.stamp for _, f, _ in rows]), counts),
-        id=np.concatenate(
-            [
-                k * _LINES_PER_KEYFRAME + np.arange(len(lines), dtype=np.int64)
-                for k, _, lines in rows
-            ]
-        ),
-    )
-
-
-def _moved(pose: Pose, lines: NDArray[np.float64]) -> NDArray[np.float64]:
-    c, s = math.cos(pose.theta), math.sin(pose.theta)
-    x, y = lines[:, 0:4:2], lines[:, 1:4:2]
-    moved = np.empty((len(lines), 4))
-    moved[:, 0:4:2] = c * x - s * y + pose.x
-    moved[:, 1:4:2] = s * x + c * y + pose.y
-    return moved
