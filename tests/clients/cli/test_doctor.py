@@ -99,7 +99,8 @@ def test_a_good_recording(records: list[ScanRecord], tmp_path: Path) -> None:
     write_jsonl(path, records)
     found = look(path, "--no-server", code=0)
     name = records[0].robot
-    for check in ("beams", "units", "clock", "map", "mirror"):
+    assert f"{name}: sensor mirrored" not in found
+    for check in ("beams", "units", "clock", "map"):
         assert found[f"{name}: {check}"]["verdict"] == "ok", found[f"{name}: {check}"]
 
 
@@ -125,7 +126,7 @@ def in_millimetres(ranges: list[Any]) -> list[Any]:
         ("clock", {"stamp": 7.0}, "send the scans' times"),
         ("clock", {"stamp": lambda s: 1e3 * s}, "milliseconds"),
         ("beams", {"angle_increment": 1e-5}, "One degree is 0.01745"),
-        ("mirror", {"ranges": lambda r: r[::-1]}, "upside down"),
+        ("sensor mirrored", {"ranges": lambda r: r[::-1]}, "upside down"),
     ],
 )
 def test_one_fault_each(
@@ -134,7 +135,7 @@ def test_one_fault_each(
     path = changed(records, tmp_path / "bad.jsonl", **changes)
     finding = look(path, "--no-server", code=4)[f"{records[0].robot}: {check}"]
     assert finding["verdict"] == "wrong"
-    assert what in finding["advice"]
+    assert what in finding["advice"] + finding["found"]
 
 
 def test_a_field_error_names_line_and_field(records: list[ScanRecord], tmp_path: Path) -> None:

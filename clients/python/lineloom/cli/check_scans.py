@@ -16,7 +16,9 @@ from lineloom.wire import Scan
 
 _LONGEST_INDOORS_M = 200.0
 _MOST_MAPPED = 600
-_LEAST_TURN_RAD = 1.0
+_APART = "not-joined"
+_SURE = {"mirrored", "turn-scale"}
+"""Findings of the mapper's sensor doctor that spoil a map; so does what keeps it from joining."""
 
 
 def check_scans(path: Path) -> Iterator[Finding]:
@@ -106,11 +108,9 @@ def _mapped(name: str, stream: Stream) -> Iterator[Finding]:
         yield wrong(f"{name}map", found, advice)
     else:
         yield ok(f"{name}map", found)
-    if trial.turned_with_odometry is not None and trial.turned > _LEAST_TURN_RAD:
-        if trial.turned_with_odometry < -0.5:
-            advice = "is the lidar upside down? PUT its mount with `inverted`, or negate the angles"
-            yield wrong(f"{name}mirror", "it turns against its odometry", advice)
-        else:
-            yield ok(f"{name}mirror", "it turns as its odometry does")
     for finding in trial.health:
-        yield noted(f"{name}health", finding)
+        what, _, message = finding.partition(": ")
+        if what in _SURE or any(f.startswith(_APART) for f in trial.health):
+            yield wrong(f"{name}sensor {what}", message, "mend it before this robot maps")
+        else:
+            yield noted(f"{name}sensor {what}", message)
