@@ -11,7 +11,7 @@ from fastapi.middleware.cors import CORSMiddleware
 from lineloom_service import __version__, errors, openapi
 from lineloom_service.dependencies import admitted
 from lineloom_service.observation.requests import RequestObserver
-from lineloom_service.routes import OPEN_ROUTERS, ROUTERS, allowed_methods, docs
+from lineloom_service.routes import OPEN_ROUTERS, ROUTERS, allowed_methods, docs, viewer
 from lineloom_service.security.headers import SecurityHeaders
 from lineloom_service.service import Service
 from lineloom_service.settings import Settings
@@ -50,6 +50,7 @@ def create_app(settings: Settings | None = None, *, service: Service | None = No
     for router in OPEN_ROUTERS:
         app.include_router(router)
     docs.mount(app)
+    viewer.mount(app)
     if served.settings.allow_origins:
         _allow_origins(app, served.settings.allow_origins)
     # The last one added is the outermost.

@@ -20,6 +20,7 @@ from lineloom_service.routes import (
     status,
     trajectory,
     transforms,
+    viewer,
 )
 
 ROUTERS: tuple[APIRouter, ...] = (
@@ -40,7 +41,7 @@ ROUTERS: tuple[APIRouter, ...] = (
 )
 """What takes a token, where there are tokens; in the order of the documentation."""
 
-OPEN_ROUTERS: tuple[APIRouter, ...] = (status.router, docs.router)
+OPEN_ROUTERS: tuple[APIRouter, ...] = (status.router, docs.router, viewer.router)
 """What never does: it says nothing about any site."""
 
 

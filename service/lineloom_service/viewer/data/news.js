@@ -1,0 +1,35 @@
+/**
+ * Return what happened between two states, in plain words: components that joined or parted,
+ * constraints that an operator or the service has withdrawn, robots that lost their way.
+ *
+ * @param {import("./site_state.js").SiteState} before
+ * @param {import("./site_state.js").SiteState} after
+ * @returns {string[]}
+ */
+export function newsBetween(before, after) {
+  return [...joined(before, after), ...parted(before, after), ...lost(before, after)];
+}
+
+/** @param {import("./site_state.js").SiteState} before @param {import("./site_state.js").SiteState} after */
+function joined(before, after) {
+  return before.components
+    .filter(({ id }) => after.survivorOf(id) !== id && before.survivorOf(id) === id)
+    .map(({ id, robots }) => {
+      const survivor = after.survivorOf(id);
+      return `Component ${id} (${robots.join(", ")}) joined ${survivor}`;
+    });
+}
+
+/** @param {import("./site_state.js").SiteState} before @param {import("./site_state.js").SiteState} after */
+function parted(before, after) {
+  return after.components
+    .filter(({ id }) => before.survivorOf(id) !== id)
+    .map(({ id, robots }) => `Component ${id} (${robots.join(", ")}) parted from ${before.survivorOf(id)}`);
+}
+
+/** @param {import("./site_state.js").SiteState} before @param {import("./site_state.js").SiteState} after */
+function lost(before, after) {
+  return after.robots
+    .filter(({ robot, state }) => state === "lost" && before.robot(robot)?.state === "tracking")
+    .map(({ robot }) => `${robot} has lost track`);
+}

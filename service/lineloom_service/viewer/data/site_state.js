@@ -1,0 +1,104 @@
+import { Bounds } from "../geometry/bounds.js";
+import { LineSet } from "./line_set.js";
+
+/**
+ * @typedef {import("../net/contract.js").ConstraintAnswer} ConstraintAnswer
+ * @typedef {import("../net/contract.js").GraphNode} Keyframe
+ * @typedef {{robot: string, component: string, points: Float32Array}} Path
+ * A piece of trajectory at keyframe resolution: x, y per point in the component's frame.
+ */
+
+/** Everything that the page shows of a site at one version; never changed once made. */
+export class SiteState {
+  /**
+   * @param {{site: import("../net/contract.js").SiteAnswer,
+   *   map: import("../net/contract.js").MapAnswer,
+   *   robots: import("../net/contract.js").RobotAnswer[],
+   *   graph: import("../net/contract.js").GraphAnswer,
+   *   constraints: ConstraintAnswer[]}} answers
+   */
+  constructor({ site, map, robots, graph, constraints }) {
+    this.answers = { site, map, robots, graph, constraints };
+    this.site = site;
+    this.version = map.version;
+    this.receivedAt = Date.now();
+    /** Names in the order of their colours: the same as in the service's own pictures. */
+    this.robotNames = [...new Set([...site.robots, ...robots.map((r) => r.robot)])].sort();
+    this.robots = [...robots].sort((a, b) => (a.robot < b.robot ? -1 : 1));
+    this.lines = new LineSet(map.lines, this.robotNames);
+    /** @type {Map<number, Keyframe>} */
+    this.keyframes = new Map(graph.nodes.map((node) => [node.id, node]));
+    /** @type {Map<string, ConstraintAnswer>} */
+    this.constraints = new Map(constraints.map((c) => [c.id, c]));
+    this.submaps = graph.graph.submaps ?? [];
+    this.paths = pathsOf(graph);
+    this.components = componentsOf(this);
+  }
+
+  /** @param {string} id */
+  component(id) {
+    return this.components.find((c) => c.id === id);
+  }
+
+  /** @param {string} name */
+  robot(name) {
+    return this.robots.find((r) => r.robot === name);
+  }
+
+  /** Return the component that one has become part of. @param {string} id */
+  survivorOf(id) {
+    let current = id;
+    while (this.site.merged_into[current] !== undefined) current = this.site.merged_into[current];
+    return current;
+  }
+}
+
+/**
+ * @typedef {{id: string, robots: string[], keyframes: number, bounds: Bounds}} Component
+ */
+
+/** @param {SiteState} state @returns {Component[]} */
+function componentsOf(state) {
+  /** @type {Map<string, Component>} */
+  const found = new Map();
+  for (const node of state.keyframes.values()) {
+    let component = found.get(node.component);
+    if (!component) {
+      component = { id: node.component, robots: [], keyframes: 0, bounds: new Bounds() };
+      found.set(node.component, component);
+    }
+    component.keyframes += 1;
+    if (!component.robots.includes(node.robot)) component.robots.push(node.robot);
+    component.bounds.add(node.x, node.y);
+  }
+  for (const [id, bounds] of state.lines.bounds) {
+    const component = found.get(id);
+    if (component) component.bounds = component.bounds.union(bounds);
+    else found.set(id, { id, robots: [], keyframes: 0, bounds });
+  }
+  return [...found.values()].sort((a, b) => b.keyframes - a.keyframes || (a.id < b.id ? -1 : 1));
+}
+
+/** Return the robots' ways from keyframe to keyframe, cut where a step is not known. @param {import("../net/contract.js").GraphAnswer} graph @returns {Path[]} */
+function pathsOf(graph) {
+  const steps = new Set();
+  for (const edge of graph.edges) {
+    if (edge.kind === "sequential") steps.add(`${edge.source} ${edge.target}`);
+  }
+  /** @type {Map<string, Keyframe[][]>} */
+  const pieces = new Map();
+  for (const node of [...graph.nodes].sort((a, b) => a.id - b.id)) {
+    const ofRobot = pieces.get(node.robot) ?? [];
+    pieces.set(node.robot, ofRobot);
+    const piece = ofRobot[ofRobot.length - 1];
+    if (piece && steps.has(`${piece[piece.length - 1].id} ${node.id}`)) piece.push(node);
+    else ofRobot.push([node]);
+  }
+  return [...pieces].flatMap(([robot, ofRobot]) =>
+    ofRobot.map((piece) => ({
+      robot,
+      component: piece[0].component,
+      points: Float32Array.from(piece.flatMap((node) => [node.x, node.y])),
+    })),
+  );
+}

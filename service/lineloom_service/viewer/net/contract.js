@@ -1,0 +1,55 @@
+/**
+ * The service's answers, as far as the viewer reads them. `/openapi.json` is the whole truth.
+ *
+ * @typedef {import("../geometry/pose.js").Pose} Pose
+ *
+ * @typedef {{accepted: number, processed: number, pending: number, skipped: number}} ScanCounts
+ * @typedef {{id: string, robots: string[], keyframes: number}} ComponentAnswer
+ * @typedef {{site: string, version: number, idle: boolean, scans: ScanCounts, robots: string[],
+ *   components: ComponentAnswer[], merged_into: Object<string, string>,
+ *   constraints: Object<string, Object<string, number>>}} SiteAnswer
+ *
+ * @typedef {{robot: string, component: string|null, state: "starting"|"tracking"|"lost",
+ *   pose: (Pose & {covariance: (number|null)[][]|null})|null, scans: ScanCounts,
+ *   keyframes: number, latest_stamp: number|null, latest_session: string|null,
+ *   latest_seq: number|null, health: string[]}} RobotAnswer
+ *
+ * @typedef {{id: string, component: string, x1: number, y1: number, x2: number, y2: number,
+ *   sigma: number, support: number, robots: string[], first_seen: number,
+ *   last_seen: number}} LineAnswer
+ * @typedef {{site: string, version: number, components: {id: string, robots: string[]}[],
+ *   lines: LineAnswer[]}} MapAnswer
+ *
+ * @typedef {{id: number, robot: string, component: string, session: string, seq: number,
+ *   stamp: number, x: number, y: number, theta: number}} GraphNode
+ * @typedef {{source: number, target: number, key: string, kind: string, state: string,
+ *   residual: number|null}} GraphEdge
+ * @typedef {{id: number, robot: string, anchor: number, keyframes: number[]}} Submap
+ * @typedef {{graph: {site: string, version: number, submaps?: Submap[]}, nodes: GraphNode[],
+ *   edges: GraphEdge[]}} GraphAnswer
+ *
+ * @typedef {"sequential"|"loop"|"rendezvous"} ConstraintKind
+ * @typedef {"candidate"|"accepted"|"rejected"|"retracted"} ConstraintState
+ * @typedef {{at_least: number|null, at_most: number|null, holds: boolean}} Limit
+ * @typedef {{reference: number[], current: number[], overlap: number, distance: number,
+ *   angle: number}} MatchedPair
+ * @typedef {{id: string, kind: ConstraintKind, state: ConstraintState, keyframe_a: number,
+ *   keyframe_b: number, robot_a: string|null, robot_b: string|null, T_a_b: Pose, reason: string,
+ *   checks: Object<string, number|null>, consistency_set: string[], residual: number|null,
+ *   limits?: Object<string, Limit>, matched?: MatchedPair[], conflicts?: number[][],
+ *   votes?: number|null, runner_up?: (Pose & {score: number})|null, margin?: number|null,
+ *   history?: {version: number, state: string, reason: string}[]}} ConstraintAnswer
+ *
+ * @typedef {{action: string, constraint: string, splits: string[][], robots: {robot: string,
+ *   moved_m: number, turned_rad: number, component_before: string|null,
+ *   component_after: string|null}[]}} WhatIfAnswer
+ *
+ * @typedef {Pose & {component: string, covariance: (number|null)[][]|null, score: number,
+ *   checks: Object<string, number|null>}} HypothesisAnswer
+ * @typedef {{verdict: "unique"|"ambiguous"|"unknown", hypotheses: HypothesisAnswer[],
+ *   reason?: string}} LocalizeAnswer
+ *
+ * @typedef {{seq: number, stamp: number, component: string, x: number, y: number,
+ *   theta: number}} TrajectoryPose
+ */
+export {};

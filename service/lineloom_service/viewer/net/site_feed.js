@@ -1,0 +1,175 @@
+import { ProblemError, UnreachableError } from "./api.js";
+import { EventStream } from "./event_stream.js";
+import { SiteReader } from "./site_reader.js";
+
+const POLL_MS = 1500;
+const WATCHDOG_MS = 15000;
+const LEAST_PAUSE_MS = 350;
+const MOST_PAUSE_MS = 10000;
+const RETRY_MS = [500, 1000, 2000, 4000, 8000];
+/** Events after which only the robots have moved. */
+const LIGHT = new Set(["scan", "robot"]);
+
+/**
+ * @typedef {"connecting"|"live"|"polling"|"away"|"unauthorised"|"forbidden"|"empty"|"failed"} Connection
+ * @typedef {{onState: (state: import("../data/site_state.js").SiteState) => void,
+ *   onRobots: (robots: import("./contract.js").RobotAnswer[]) => void,
+ *   onSite: (site: import("./contract.js").SiteAnswer) => void,
+ *   onEvent: (event: {type: string, data: any}) => void,
+ *   onConnection: (connection: Connection, detail: string) => void}} Listener
+ */
+
+/**
+ * Keeps a site's state current: events say when to ask, polling takes over where there is no event
+ * stream, and a service that went away is asked again until it is back.
+ */
+export class SiteFeed {
+  /** @param {import("./api.js").Api} api @param {string} site @param {Listener} listener */
+  constructor(api, site, listener) {
+    this._api = api;
+    this._path = `v1/sites/${encodeURIComponent(site)}/events`;
+    this._reader = new SiteReader(api, site);
+    this._listener = listener;
+    this._stopped = false;
+    this._version = -1;
+    /** @type {"none"|"robots"|"all"} */
+    this._due = "all";
+    this._wake = () => {};
+    this._failures = 0;
+    this._streaming = false;
+    /** @type {EventStream|null} */
+    this._stream = null;
+    this._onVisible = () => document.hidden || this.refresh();
+  }
+
+  start() {
+    document.addEventListener("visibilitychange", this._onVisible);
+    this._listener.onConnection("connecting", "");
+    void this._readLoop();
+    void this._streamLoop();
+  }
+
+  stop() {
+    this._stopped = true;
+    document.removeEventListener("visibilitychange", this._onVisible);
+    this._stream?.close();
+    this._wake();
+  }
+
+  /** Ask for everything now. */
+  refresh() {
+    this._due = "all";
+    this._failures = 0;
+    this._wake();
+  }
+
+  async _readLoop() {
+    while (!this._stopped) {
+      const began = performance.now();
+      const what = this._due;
+      this._due = "none";
+      try {
+        await this._read(what);
+        this._failures = 0;
+      } catch (error) {
+        this._fail(error);
+        await this._sleep(this._backOff(), true);
+        continue;
+      }
+      // The heavier the site, the longer the pause: at most a fifth of the time is spent asking.
+      const took = performance.now() - began;
+      await this._pause(Math.min(Math.max(4 * took, LEAST_PAUSE_MS), MOST_PAUSE_MS));
+      if (this._due === "none") await this._sleep(this._streaming ? WATCHDOG_MS : POLL_MS, false);
+      if (this._due === "none") this._due = "robots";
+    }
+  }
+
+  /** @param {"none"|"robots"|"all"} what */
+  async _read(what) {
+    const site = await this._reader.site();
+    if (this._stopped) return;
+    this._listener.onConnection(this._streaming ? "live" : "polling", "");
+    this._listener.onSite(site);
+    if (document.hidden) return;
+    // Without events, only the version tells that something has changed.
+    const changed = site.version !== this._version;
+    if (what === "all" || (changed && !this._streaming)) {
+      const state = await this._reader.state();
+      if (this._stopped) return;
+      this._version = state.version;
+      this._listener.onState(state);
+    } else if (changed || what === "robots") {
+      const robots = await this._reader.robots();
+      if (!this._stopped) this._listener.onRobots(robots);
+    }
+  }
+
+  async _streamLoop() {
+    let failures = 0;
+    while (!this._stopped) {
+      this._stream ??= new EventStream(this._api, this._path, (event) => this._take(event));
+      let exists = true;
+      try {
+        exists = await this._stream.read(() => {
+          failures = 0;
+          this._streaming = true;
+          this.refresh(); // whatever happened before the stream was open
+        });
+      } catch {
+        failures += 1; // the read loop meets the same failure and reports it
+      }
+      this._streaming = false;
+      if (this._stopped) return;
+      if (exists) this.refresh();
+      const wait = RETRY_MS[Math.min(failures, RETRY_MS.length - 1)];
+      await new Promise((resolve) => setTimeout(resolve, this._stream?.retry ?? wait));
+    }
+  }
+
+  /** @param {{type: string, data: any}} event */
+  _take(event) {
+    if (LIGHT.has(event.type)) {
+      if (this._due === "none") this._due = "robots";
+    } else {
+      this._due = "all";
+      this._listener.onEvent(event);
+    }
+    this._wake();
+  }
+
+  /** @param {unknown} error */
+  _fail(error) {
+    if (this._stopped) return;
+    this._due = "all";
+    this._failures += 1;
+    if (error instanceof ProblemError) {
+      const known = { 401: "unauthorised", 403: "forbidden", 404: "empty" }[error.status];
+      this._listener.onConnection(/** @type {Connection} */ (known ?? "failed"), error.message);
+    } else if (error instanceof UnreachableError) {
+      this._listener.onConnection("away", error.message);
+    } else {
+      this._listener.onConnection("failed", String(error));
+    }
+  }
+
+  _backOff() {
+    return RETRY_MS[Math.min(this._failures - 1, RETRY_MS.length - 1)];
+  }
+
+  /** @param {number} ms */
+  _pause(ms) {
+    return new Promise((resolve) => setTimeout(resolve, ms));
+  }
+
+  /** Sleep; an event wakes it, or only a call of refresh where `deep`. @param {number} ms @param {boolean} deep */
+  _sleep(ms, deep) {
+    return new Promise((resolve) => {
+      const timer = setTimeout(resolve, ms);
+      this._wake = () => {
+        if (deep && this._failures > 0 && !this._stopped) return;
+        clearTimeout(timer);
+        resolve(undefined);
+      };
+    });
+  }
+}

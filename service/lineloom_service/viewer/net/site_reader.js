@@ -1,0 +1,70 @@
+import { SiteState } from "../data/site_state.js";
+
+const PAGE = 1000;
+
+/** Fetches what a SiteState is made of. */
+export class SiteReader {
+  /** @param {import("./api.js").Api} api @param {string} site */
+  constructor(api, site) {
+    this._api = api;
+    this._path = `v1/sites/${encodeURIComponent(site)}`;
+  }
+
+  /** Return how the site is doing. @returns {Promise<import("./contract.js").SiteAnswer>} */
+  site() {
+    return this._api.get(this._path);
+  }
+
+  /** Return the robots alone: cheap, for what moves all the time. @returns {Promise<import("./contract.js").RobotAnswer[]>} */
+  async robots() {
+    return (await this._api.get(`${this._path}/robots`)).robots;
+  }
+
+  /**
+   * Return the whole state. The answers are fetched side by side while the service goes on, so
+   * they may differ by a version: then they are fetched once more.
+   */
+  async state() {
+    let answers = await this._answers();
+    if (!agree(answers)) answers = await this._answers();
+    return new SiteState(answers);
+  }
+
+  async _answers() {
+    const [site, map, robots, graph, constraints] = await Promise.all([
+      this.site(),
+      this._api.get(`${this._path}/map`),
+      this.robots(),
+      this._api.get(`${this._path}/graph`),
+      this._constraints(),
+    ]);
+    return { site, map, robots, graph, constraints };
+  }
+
+  /** Return loops and rendezvous; tracked steps are drawn as trajectories. @returns {Promise<import("./contract.js").ConstraintAnswer[]>} */
+  async _constraints() {
+    const kinds = await Promise.all(["loop", "rendezvous"].map((kind) => this._ofKind(kind)));
+    return kinds.flat();
+  }
+
+  /** @param {string} kind */
+  async _ofKind(kind) {
+    const found = [];
+    let cursor = "";
+    for (;;) {
+      const query = `kind=${kind}&limit=${PAGE}${cursor}`;
+      const page = await this._api.get(`${this._path}/constraints?${query}`);
+      found.push(...page.constraints);
+      if (!page.next_cursor) return found;
+      cursor = `&cursor=${encodeURIComponent(page.next_cursor)}`;
+    }
+  }
+}
+
+/** Tell whether map and graph know the same components. @param {any} answers */
+function agree({ map, graph }) {
+  if (map.version === graph.graph.version) return true;
+  const mapped = new Set(map.components.map((/** @type {any} */ c) => c.id));
+  const known = new Set(graph.nodes.map((/** @type {any} */ node) => node.component));
+  return mapped.size === known.size && [...mapped].every((id) => known.has(id));
+}

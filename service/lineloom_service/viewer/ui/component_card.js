@@ -1,0 +1,51 @@
+import { h } from "./dom.js";
+import { card, facts, part, swatch } from "./card.js";
+import { count, metres } from "./format.js";
+
+/**
+ * A part of the map whose inner geometry is known.
+ *
+ * @param {import("../data/site_state.js").Component} component
+ * @param {import("./inspector.js").CardContext} context
+ */
+export function componentCard(component, { state, palette, onClose, onPick, onGoTo }) {
+  const lines = state.lines.answers.filter((line) => line.component === component.id);
+  const wall = lines.reduce((sum, l) => sum + Math.hypot(l.x2 - l.x1, l.y2 - l.y1), 0);
+  const absorbed = Object.keys(state.site.merged_into).filter((id) => state.survivorOf(id) === component.id);
+  const robots = component.robots.map((name) =>
+    h(
+      "li",
+      {},
+      h(
+        "button",
+        { onclick: () => onPick({ kind: "robot", id: name }), "data-key": `member ${name}` },
+        swatch(palette.robot(state.robotNames.indexOf(name))),
+        h("span", { className: "name" }, name),
+      ),
+    ),
+  );
+  const several = state.components.length > 1;
+  return card(
+    `Component ${component.id}`,
+    null,
+    onClose,
+    several &&
+      h(
+        "p",
+        { className: "reason" },
+        "How this part of the map lies to the others is not known yet. They are drawn side by side until the evidence is enough.",
+      ),
+    facts([
+      ["Walls", `${count(lines.length)}, ${metres(wall)} in all`],
+      ["Keyframes", count(component.keyframes)],
+      ["Extent", `${component.bounds.width.toFixed(1)} × ${component.bounds.height.toFixed(1)} m`],
+      ["Has absorbed", absorbed.join(", ") || null],
+    ]),
+    part("Robots", h("ul", { className: "rows" }, ...robots)),
+    h(
+      "div",
+      { className: "buttons" },
+      h("button", { onclick: () => onGoTo({ kind: "component", id: component.id }), "data-key": "go" }, "Show"),
+    ),
+  );
+}

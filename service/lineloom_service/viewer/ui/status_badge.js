@@ -1,0 +1,55 @@
+import { h, refill } from "./dom.js";
+import { count } from "./format.js";
+
+/** @type {Record<string, [string, string]>} connection -> [tone, words] */
+const WORDS = {
+  connecting: ["", "Connecting"],
+  live: ["good", "Live"],
+  polling: ["good", "Live (polling)"],
+  away: ["bad", "Service away"],
+  unauthorised: ["bad", "Token needed"],
+  forbidden: ["bad", "Not allowed"],
+  empty: ["", "No such site"],
+  failed: ["bad", "Failed"],
+};
+
+/** Says in one glance whether what the page shows is current. */
+export class StatusBadge {
+  /** @param {HTMLElement} element */
+  constructor(element) {
+    this._element = element;
+    this._connection = "connecting";
+    /** @type {import("../net/contract.js").SiteAnswer|null} */
+    this._site = null;
+  }
+
+  /** @param {string} connection @param {string} detail */
+  connection(connection, detail) {
+    this._connection = connection;
+    this._draw(detail);
+  }
+
+  /** @param {import("../net/contract.js").SiteAnswer|null} site */
+  site(site) {
+    this._site = site;
+    this._draw("");
+  }
+
+  /** @param {string} detail */
+  _draw(detail) {
+    let [tone, words] = WORDS[this._connection];
+    const pending = this._site?.scans.pending ?? 0;
+    const current = this._connection === "live" || this._connection === "polling";
+    if (current && pending > 0) [tone, words] = ["busy", `Mapping, ${count(pending)} scans to go`];
+    const version = this._site ? `version ${count(this._site.version)}` : "";
+    this._element.dataset.tone = tone;
+    this._element.dataset.connection = this._connection;
+    this._element.title = detail;
+    refill(
+      this._element,
+      h("span", { className: "dot", "aria-hidden": "true" }),
+      h("strong", {}, words),
+      h("span", { className: "detail" }, current ? version : detail),
+    );
+  }
+}
