@@ -39,11 +39,18 @@ class FakeSite:
         """Answer who would move."""
         others = [c for c in self.constraints if c["state"] == "accepted" and c["id"] != identity]
         parts = action == "retract" and not others
+        whole = [{"id": "c0", "robots": ["ada", "bob"]}]
+        parted = [{"id": "c0", "robots": ["ada"]}, {"id": "c1", "robots": ["bob"]}]
         return {
             "action": action,
             "constraint": identity,
-            "splits": [["c0", "c1"]] if parts else [],
-            "robots": [_move("ada", 0.0, "c0"), _move("bob", 0.12, "c1" if parts else "c0")],
+            "version": self.version,
+            "components_before": whole,
+            "components_after": parted if parts else whole,
+            "robots": [
+                _move("ada", 0.0, "c0"),
+                _move("bob", None, "c1") if parts else _move("bob", 0.12, "c0"),
+            ],
         }
 
     def site(self) -> dict[str, Any]:
@@ -171,6 +178,7 @@ def _candidate(identity: str) -> dict[str, Any]:
         "checks": {"overlap": 8.4, "conflict_share": 0.03, "margin": 0.4},
         "consistency_set": ["p5-17", "p3-15"],
         "residual": None,
+        "history": [{"version": 12, "state": "candidate", "reason": "two places look alike"}],
     }
 
 
@@ -202,18 +210,17 @@ def evidence(constraint: dict[str, Any]) -> dict[str, Any]:
             for wall in ROOM
         ],
         "conflicts": [[3.0, 1.0 + 0.1 * i] for i in range(5)],
-        "votes": 31,
-        "runner_up": {"x": 1.0, "y": 2.0, "theta": -1.57, "score": 0.3},
+        "votes": 31.5,
+        "runner_up": {"x": 1.0, "y": 2.0, "theta": -1.57, "evidence": 12.0},
         "margin": 0.4,
-        "history": [{"version": 12, "state": "candidate", "reason": "two places look alike"}],
     }
 
 
-def _move(robot: str, moved_m: float, after: str) -> dict[str, Any]:
+def _move(robot: str, moved_m: float | None, after: str) -> dict[str, Any]:
     return {
         "robot": robot,
         "moved_m": moved_m,
-        "turned_rad": 0.01 if moved_m else 0.0,
+        "turned_rad": None if moved_m is None else moved_m / 10,
         "component_before": "c0",
         "component_after": after,
     }

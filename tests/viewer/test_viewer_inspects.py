@@ -108,7 +108,7 @@ def test_what_if_then_retract_then_restore(fake: FakeServer, page: Page) -> None
     expect(inspector.locator(".tag").first).to_have_text("retracted")
     page.goto(f"{fake.url}/?site={SITE}#constraint/p5-17")
     inspector.get_by_role("button", name="What if retracted?").click()
-    expect(inspector.locator(".answer")).to_contain_text("Would part: c0 | c1")
+    expect(inspector.locator(".answer")).to_contain_text("c0 (ada) | c1 (bob)")
     inspector.get_by_role("button", name="Retract", exact=True).click()
     expect_components(page, "c0", "c1")
     inspector.get_by_role("button", name="Restore", exact=True).click()

@@ -36,12 +36,17 @@
  * @typedef {{id: string, kind: ConstraintKind, state: ConstraintState, keyframe_a: number,
  *   keyframe_b: number, robot_a: string|null, robot_b: string|null, T_a_b: Pose, reason: string,
  *   checks: Object<string, number|null>, consistency_set: string[], residual: number|null,
- *   limits?: Object<string, Limit>, matched?: MatchedPair[], conflicts?: number[][],
- *   votes?: number|null, runner_up?: (Pose & {score: number})|null, margin?: number|null,
- *   history?: {version: number, state: string, reason: string}[]}} ConstraintAnswer
+ *   history?: {version: number, state: string, reason: string}[],
+ *   limits?: Object<string, Limit>|null, matched?: MatchedPair[]|null, conflicts?: number[][]|null,
+ *   votes?: number|null, runner_up?: (Pose & {evidence: number})|null,
+ *   margin?: number|null}} ConstraintAnswer
+ * All from `limits` on is known of a constraint that was asked for alone; null where the mapper
+ * could not be asked.
  *
- * @typedef {{action: string, constraint: string, splits: string[][], robots: {robot: string,
- *   moved_m: number, turned_rad: number, component_before: string|null,
+ * @typedef {{id: string, robots: string[]}} ComponentRobots
+ * @typedef {{action: "retract"|"restore", constraint: string, components_before: ComponentRobots[],
+ *   components_after: ComponentRobots[], robots: {robot: string, moved_m: number|null,
+ *   turned_rad: number|null, component_before: string|null,
  *   component_after: string|null}[]}} WhatIfAnswer
  *
  * @typedef {Pose & {component: string, covariance: (number|null)[][]|null, score: number,

@@ -14,6 +14,10 @@ const CHECKS = {
   overlap: ["Common wall", metres],
   evidence: ["Evidence", metres],
   margin: ["Margin to runner-up", percent],
+  set_size: ["Constraints that agree", figure],
+  set_evidence: ["Their evidence", metres],
+  set_distinctive: ["Of them, from places unlike others", figure],
+  rival_evidence: ["Evidence of a rival set", metres],
   moved_m: ["Moved by the closure", metres],
   turned_rad: ["Turned by the closure", degrees],
 };

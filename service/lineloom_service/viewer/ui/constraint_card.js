@@ -12,14 +12,15 @@ import { whatIfResult } from "./what_if_result.js";
  * @param {import("./inspector.js").CardContext} context
  */
 export function constraintCard(constraint, context) {
-  const { T_a_b, checks, limits = {}, matched = [], conflicts = [], history = [] } = constraint;
+  const { T_a_b, checks, history } = constraint;
+  const limits = constraint.limits ?? {};
   return card(
     `${constraint.kind === "loop" ? "Loop" : "Rendezvous"} ${constraint.id}`,
     tag(constraint.state),
     context.onClose,
     h("p", { className: "reason", "data-state": constraint.state }, sentence(constraint.reason)),
     actions(constraint, context),
-    evidenceDrawing(matched, conflicts),
+    evidenceDrawing(constraint.matched ?? [], constraint.conflicts ?? []),
     (Object.keys(checks).length > 0 || Object.keys(limits).length > 0) &&
       part("Checks", checkTable(checks, limits)),
     uniqueness(constraint),
@@ -33,16 +34,17 @@ export function constraintCard(constraint, context) {
       ]),
     ),
     agreeing(constraint, context),
-    history.length > 0 && part("History", h("ol", { className: "story" }, ...history.map(chapter))),
+    history && history.length > 0 && part("History", h("ol", { className: "story" }, ...history.map(chapter))),
   );
 }
 
 /** @param {import("../net/contract.js").ConstraintAnswer} constraint @param {import("./inspector.js").CardContext} context */
 function actions(constraint, context) {
   const result = h("div", { role: "status" });
-  const restoring = constraint.state === "retracted";
+  const { state } = constraint;
+  const restoring = state === "retracted" || wasWithdrawn(constraint);
   const action = restoring ? "restore" : "retract";
-  const usable = restoring || constraint.state === "accepted" || constraint.state === "candidate";
+  const usable = restoring || state === "accepted" || state === "candidate";
   /** @param {Event} event @param {() => Promise<any>} work */
   const run = async (event, work) => {
     const button = /** @type {HTMLButtonElement} */ (event.currentTarget);
@@ -56,7 +58,7 @@ function actions(constraint, context) {
   };
   return h(
     "div",
-    { className: "part" },
+    { className: "actions" },
     h(
       "div",
       { className: "buttons" },
@@ -69,7 +71,8 @@ function actions(constraint, context) {
             onclick: (/** @type {Event} */ event) =>
               run(event, async () => refill(result, whatIfResult(await context.onWhatIf(constraint.id)))),
           },
-          `What if ${restoring ? "restored" : "retracted"}?`,
+          // The service looks at the opposite of what is.
+          `What if ${state === "retracted" ? "restored" : "retracted"}?`,
         ),
       usable &&
         h(
@@ -86,6 +89,11 @@ function actions(constraint, context) {
   );
 }
 
+/** Whether the mapper once believed it and then no more: that can be overruled. @param {import("../net/contract.js").ConstraintAnswer} constraint */
+function wasWithdrawn({ state, history = [] }) {
+  return state === "rejected" && history.some((entry) => entry.state === "accepted");
+}
+
 /** @param {import("../net/contract.js").ConstraintAnswer} constraint */
 function uniqueness({ votes, margin, runner_up }) {
   const given = [votes, margin, runner_up].some((value) => value !== null && value !== undefined);
@@ -94,10 +102,10 @@ function uniqueness({ votes, margin, runner_up }) {
   return part(
     "Uniqueness",
     facts([
-      ["Votes", votes === null || votes === undefined ? null : count(votes)],
-      ["Margin", margin === null || margin === undefined ? null : percent(margin)],
+      ["Lines that voted for it", votes === null || votes === undefined ? null : metres(votes)],
+      ["Lead over the runner-up", margin === null || margin === undefined ? null : percent(margin)],
       ["Runner-up", rival ?? "none"],
-      ["Its score", runner_up ? figure(runner_up.score) : null],
+      ["Speaks for that", runner_up ? metres(runner_up.evidence) : null],
     ]),
   );
 }

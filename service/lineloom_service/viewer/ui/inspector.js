@@ -86,7 +86,7 @@ export class Inspector {
     return card(thing.id, null, context.onClose, h("p", { className: "muted" }, gone));
   }
 
-  /** @param {string} id */
+  /** What was learnt of a constraint, until it is asked for again. @param {string} id */
   _kept(id) {
     return this._detail?.id === id ? this._detail : {};
   }
