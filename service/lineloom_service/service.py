@@ -41,7 +41,9 @@ class Service:
             group_limit=settings.group_limit,
         )
         self.engine: Engine = engine or LocalEngine(
-            settings.workers, publish_every_s=settings.publish_every_s
+            settings.workers,
+            publish_every_s=settings.publish_every_s,
+            patience_s=settings.entry_timeout_s,
         )
         self.events = EventHub()
         recorder = EventRecorder(

@@ -62,6 +62,11 @@ class Settings(BaseSettings):
         default=5_000, ge=1, description="Scans of one session that may wait for a gap to fill."
     )
 
+    entry_timeout_s: float = Field(
+        default=120.0,
+        gt=0.0,
+        description="A worker that is at one log entry for longer is ended; see the README.",
+    )
     chunk: int = Field(default=64, ge=1, description="Log entries sent to a worker at a time.")
     publish_every_s: float = Field(
         default=0.5, ge=0.0, description="How often a busy worker publishes its map at most."

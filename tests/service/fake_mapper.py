@@ -41,7 +41,7 @@ from lineloom_core.mapping.site_view import (
 )
 from lineloom_core.scan import Mount, Scan
 
-RAISES, CRASHES, RAISES_ONCE = 666.0, 667.0, 668.0
+RAISES, CRASHES, RAISES_ONCE, HANGS = 666.0, 667.0, 668.0, 669.0
 """Stamps of scans that make the mapper fail."""
 
 SECONDS_PER_SCAN = float(os.environ.get("FAKE_MAPPER_SECONDS", "0"))
@@ -68,6 +68,8 @@ class FakeMapper:
             time.sleep(SECONDS_PER_SCAN)
         self._version += 1
         self._link(robot, repr((scan.session, scan.seq, scan.stamp)), scan.ranges.tobytes())
+        if scan.stamp == HANGS:
+            time.sleep(3600.0)
         if scan.stamp == RAISES:
             raise ValueError("this scan is cursed")
         if scan.stamp == CRASHES:

@@ -24,7 +24,7 @@ from lineloom_service.store.codec import decode_scan, encode_mount, encode_scan
 from lineloom_service.store.records import NewScan, SnapshotRecord
 from lineloom_service.store.sql_store import SqlStore
 
-RAISES, CRASHES, RAISES_ONCE = 666.0, 667.0, 668.0
+RAISES, CRASHES, RAISES_ONCE, HANGS = 666.0, 667.0, 668.0, 669.0
 FAKE = "fake_mapper:FakeMapper"
 DATABASE_URL: str | None = None
 """Set for each test: None for SQLite."""
@@ -69,7 +69,11 @@ class System:
             max_held=100,
         )
         self.engine = LocalEngine(
-            1, publish_every_s=self.settings.publish_every_s, mapper=FAKE, warm_up=None
+            1,
+            publish_every_s=self.settings.publish_every_s,
+            patience_s=self.settings.entry_timeout_s,
+            mapper=FAKE,
+            warm_up=None,
         )
         self.conductor = Conductor(self.store, self.engine, self.settings)
 
@@ -231,6 +235,18 @@ async def test_a_scan_that_crashes_the_worker_is_skipped_and_the_site_goes_on(
         (skip,) = system.conductor.skips(1)
         assert skip.seq == 7
         assert "SIGSEGV" in skip.reason
+
+
+async def test_a_scan_on_which_the_worker_hangs_is_skipped_and_the_site_goes_on(
+    tmp_path: Path,
+) -> None:
+    async with _running(tmp_path, entry_timeout_s=0.5) as system:
+        await system.post(range(20), stamps={7: HANGS})
+        published = await system.caught_up()
+        assert (published.scans, published.skipped) == (19, 1)
+        (skip,) = system.conductor.skips(1)
+        assert skip.seq == 7
+        assert "did not come back within 0.5 s" in skip.reason
 
 
 async def test_a_failure_that_does_not_come_again_costs_no_scan(

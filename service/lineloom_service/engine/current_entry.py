@@ -6,11 +6,15 @@ import mmap
 import os
 import struct
 import tempfile
+import time
 
 RESTORING = -1
 """Stands for a position while a snapshot is restored."""
 
-_LAYOUT = struct.Struct("=qq")
+BUSY = -2
+"""Stands for a position while the site is worked on, and no entry is to blame for it."""
+
+_LAYOUT = struct.Struct("=qqd")
 _NOTHING = (0, 0)
 
 
@@ -30,16 +34,21 @@ class CurrentEntry:
 
     def mark(self, site: int, position: int) -> None:
         """Say what is being worked on now."""
-        _LAYOUT.pack_into(self._memory, 0, site, position)
+        _LAYOUT.pack_into(self._memory, 0, site, position, time.monotonic())
 
     def clear(self) -> None:
         """Say that nothing is."""
-        _LAYOUT.pack_into(self._memory, 0, *_NOTHING)
+        _LAYOUT.pack_into(self._memory, 0, *_NOTHING, 0.0)
 
     def read(self) -> tuple[int, int] | None:
         """Return site and position, None where nothing is being worked on."""
-        site, position = _LAYOUT.unpack_from(self._memory, 0)
+        site, position, _ = _LAYOUT.unpack_from(self._memory, 0)
         return None if (site, position) == _NOTHING else (site, position)
+
+    def seconds(self) -> float:
+        """How long it has been worked on; 0 where nothing is. The clock is the whole machine's."""
+        site, position, since = _LAYOUT.unpack_from(self._memory, 0)
+        return 0.0 if (site, position) == _NOTHING else time.monotonic() - float(since)
 
     def close(self) -> None:
         """Let go of the memory."""

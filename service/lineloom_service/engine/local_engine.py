@@ -9,6 +9,7 @@ from collections.abc import Awaitable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from lineloom_service.engine.current_entry import BUSY
 from lineloom_service.engine.mapper import SITE_MAPPER, WARM_UP
 from lineloom_service.engine.messages import (
     Answered,
@@ -39,6 +40,7 @@ from lineloom_service.store.records import LogEntry
 
 _LOG = logging.getLogger(__name__)
 _RESPAWN_S = 0.1
+_WATCH_S = 2.0
 _RESPAWN_LIMIT_S = 10.0
 
 
@@ -78,12 +80,15 @@ class LocalEngine:
         workers: int,
         *,
         publish_every_s: float = 0.5,
+        patience_s: float = 120.0,
         mapper: str = SITE_MAPPER,
         warm_up: str | None = WARM_UP,
     ) -> None:
         self._mapper = mapper
         self._warm_up = warm_up
         self._publish_every_s = publish_every_s
+        self._patience_s = patience_s
+        self._watching: asyncio.Task[None] | None = None
         self._slots = [_Slot(number) for number in range(workers)]
         self._sites: dict[int, _Site] = {}
         self._listeners: list[ViewListener] = []
@@ -101,10 +106,13 @@ class LocalEngine:
         for slot in self._slots:
             slot.ready.clear()
             self._spawn(slot)
+        self._watching = asyncio.create_task(self._watch(), name="watch-workers")
 
     async def stop(self) -> None:
         """Kill the workers."""
         self._stopping = True
+        if self._watching is not None:
+            self._watching.cancel()
         for slot in self._slots:
             if slot.process is not None:
                 slot.process.kill()
@@ -195,8 +203,16 @@ class LocalEngine:
             process.send(order)
         return answer
 
+    async def _watch(self) -> None:
+        """A worker may hang and not die, in a solver or on a device: then it is ended."""
+        while True:
+            await asyncio.sleep(min(_WATCH_S, self._patience_s / 4))
+            for slot in self._slots:
+                if slot.process is not None:
+                    slot.process.kill_if_hung(self._patience_s)
+
     def _spawn(self, slot: _Slot) -> None:
-        if self._stopping:
+        if self._stopping or slot.process is not None:
             return
         process = slot.process = WorkerProcess(
             f"lineloom-worker-{slot.number}",
@@ -239,8 +255,9 @@ class LocalEngine:
         slot.ready.clear()
         slot.process = None
         for site in slot.sites:
-            mine = process.blamed is not None and process.blamed[0] == site
-            position = process.blamed[1] if mine and process.blamed is not None else None
+            blamed = process.blamed
+            to_blame = blamed is not None and blamed[0] == site and blamed[1] != BUSY
+            position = blamed[1] if to_blame and blamed is not None else None
             self._sites[site].fail(
                 WorkerDiedError(position, slot.last_words, killed=process.killed)
             )

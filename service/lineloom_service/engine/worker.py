@@ -14,7 +14,7 @@ from multiprocessing.connection import Connection
 
 from lineloom_core import timing
 
-from lineloom_service.engine.current_entry import RESTORING, CurrentEntry
+from lineloom_service.engine.current_entry import BUSY, RESTORING, CurrentEntry
 from lineloom_service.engine.mapper import QUESTIONS, Mapper, MapperFactory, apply, load
 from lineloom_service.engine.messages import (
     Answered,
@@ -33,8 +33,10 @@ from lineloom_service.engine.messages import (
     Timed,
     View,
 )
+from lineloom_service.engine.turns import Turns
 from lineloom_service.observation.durations import Durations
 from lineloom_service.observation.log import configure_from_environment
+from lineloom_service.store.records import LogEntry
 
 _LOG = logging.getLogger(__name__)
 
@@ -46,11 +48,15 @@ _PUBLISHING_SHARE = 0.1
 
 @dataclass(slots=True)
 class _Hosted:
-    """A site's mapper. due: when to publish, None where the view is up to date."""
+    """A site's mapper. taken: entries of the feed under way that it has.
+
+    due: when to publish, None where the view is up to date.
+    """
 
     run: int
     mapper: Mapper
     position: int
+    taken: int = 0
     due: float | None = None
     earliest: float = 0.0
     pause: float = 0.0
@@ -74,29 +80,43 @@ class Worker:
         self._factory = factory
         self._publish_every_s = publish_every_s
         self._sites: dict[int, _Hosted] = {}
+        self._turns = Turns()
         self._durations = Durations()
         timing.listen(self._durations.observe)
 
     def serve(self) -> None:
-        """Take orders, and publish what is due between them."""
+        """Work through orders entry by entry, sites in turn, and publish what is due between."""
         self._connection.send(Ready())
         while True:
-            if self._connection.poll(self._pause()):
+            while self._connection.poll(self._pause()):
                 try:
-                    order = self._connection.recv()
+                    self._turns.put(self._connection.recv())
                 except EOFError:
                     return
-                self._obey(order)
+            if self._turns:
+                self._take_turn()
             self._publish_due()
 
+    def _take_turn(self) -> None:
+        order = self._turns.next()
+        begin = time.monotonic()
+        if self._obey(order):
+            self._turns.spend(order.site, time.monotonic() - begin)
+            self._turns.done(order.site)
+        else:
+            self._turns.spend(order.site, time.monotonic() - begin)
+
     def _pause(self) -> float | None:
-        due = [hosted.due for hosted in self._sites.values() if hosted.due is not None]
+        if self._turns:
+            return 0.0
+        due = [h.due for h in self._sites.values() if h.due is not None and not h.taken]
         return max(0.0, min(due) - time.monotonic()) if due else None
 
-    def _obey(self, order: Order) -> None:
+    def _obey(self, order: Order) -> bool:
+        """Carry out an order, of a feed one entry only; False while there is more of it."""
         if isinstance(order, Feed):
-            self._feed(order)
-        elif isinstance(order, StartSite):
+            return self._feed(order)
+        if isinstance(order, StartSite):
             self._start(order)
         elif isinstance(order, TakeSnapshot):
             self._snapshot(order)
@@ -104,6 +124,7 @@ class Worker:
             self._answer(order)
         elif isinstance(order, StopSite):
             self._sites.pop(order.site, None)
+        return True
 
     def _start(self, order: StartSite) -> None:
         self._sites.pop(order.site, None)
@@ -122,35 +143,46 @@ class Worker:
         self._sites[order.site] = _Hosted(order.run, mapper, order.position, due=now)
         self._connection.send(Started(order.site, order.run))
 
-    def _feed(self, order: Feed) -> None:
+    def _feed(self, order: Feed) -> bool:
         hosted = self._hosted(order)
         if hosted is None:
-            return
-        for entry in order.entries:
-            self._current.mark(order.site, entry.position)
-            begin = time.perf_counter()
-            try:
-                apply(hosted.mapper, entry)
-            except Exception as error:
-                # Half of the entry may have been taken: this mapper is not to be used again.
-                del self._sites[order.site]
-                reason = describe(error)
-                self._connection.send(Failed(order.site, order.run, entry.position, reason))
-                return
-            finally:
-                self._current.clear()
-            self._durations.observe("entry", time.perf_counter() - begin)
+            return True
+        if hosted.taken < len(order.entries):
+            if not self._apply(hosted, order, order.entries[hosted.taken]):
+                return True
+            hosted.taken += 1
+        if hosted.taken < len(order.entries):
+            return False
+        hosted.taken = 0
         hosted.position = order.through
         pause = _CAUGHT_UP_PAUSE_S if order.caught_up else self._publish_every_s
         hosted.due = hosted.earliest + max(pause, hosted.pause)
         if order.publish:
             self._publish(order.site, hosted)
         self._connection.send(Fed(order.site, order.run))
+        return True
+
+    def _apply(self, hosted: _Hosted, order: Feed, entry: LogEntry) -> bool:
+        self._current.mark(order.site, entry.position)
+        begin = time.perf_counter()
+        try:
+            apply(hosted.mapper, entry)
+        except Exception as error:
+            # Half of the entry may have been taken: this mapper is not to be used again.
+            del self._sites[order.site]
+            reason = describe(error)
+            self._connection.send(Failed(order.site, order.run, entry.position, reason))
+            return False
+        finally:
+            self._current.clear()
+        self._durations.observe("entry", time.perf_counter() - begin)
+        return True
 
     def _snapshot(self, order: TakeSnapshot) -> None:
         hosted = self._hosted(order)
         if hosted is None:
             return
+        self._current.mark(order.site, BUSY)
         try:
             # Four times smaller at the quickest level.
             begin = time.perf_counter()
@@ -161,12 +193,15 @@ class Worker:
             del self._sites[order.site]
             self._connection.send(Failed(order.site, order.run, hosted.position, describe(error)))
             return
+        finally:
+            self._current.clear()
         self._connection.send(Snapshot(order.site, order.run, data))
 
     def _answer(self, order: Ask) -> None:
         hosted = self._hosted(order)
         if hosted is None:
             return
+        self._current.mark(order.site, BUSY)
         try:
             if order.question not in QUESTIONS:
                 raise ValueError(f"no question {order.question!r}")
@@ -176,6 +211,8 @@ class Worker:
             _LOG.exception("site %d: %s was not answered", order.site, order.question)
             self._connection.send(Answered(order.site, order.run, failure=describe(error)))
             return
+        finally:
+            self._current.clear()
         self._connection.send(Answered(order.site, order.run, value))
 
     def _hosted(self, order: Feed | TakeSnapshot | Ask) -> _Hosted | None:
@@ -186,12 +223,14 @@ class Worker:
     def _publish_due(self) -> None:
         now = time.monotonic()
         for site, hosted in self._sites.items():
-            if hosted.due is not None and hosted.due <= now:
+            # A version is what whole entries made, and a position what was fed through.
+            if hosted.due is not None and hosted.due <= now and not hosted.taken:
                 self._publish(site, hosted)
 
     def _publish(self, site: int, hosted: _Hosted) -> None:
         started = time.monotonic()
         hosted.due = None
+        self._current.mark(site, BUSY)
         try:
             view = hosted.mapper.view()
         except Exception:
@@ -201,6 +240,7 @@ class Worker:
             self._durations.observe("view", time.monotonic() - started)
             self._connection.send(Timed(self._durations.take()))
             self._connection.send(View(site, hosted.run, hosted.position, view))
+        self._current.clear()
         hosted.earliest = time.monotonic()
         hosted.pause = (hosted.earliest - started) / _PUBLISHING_SHARE
 

@@ -41,6 +41,8 @@ class WorkerProcess:
         self._loop = asyncio.get_running_loop()
         self._current = CurrentEntry.create()
         self._blamed: tuple[int, int] | None = None
+        self._hung_s: float | None = None
+        self._alive = True
         ours, theirs = Pipe()
         self._connection: Connection[Order, Report] = ours
         life, self._life = os.pipe()
@@ -74,16 +76,24 @@ class WorkerProcess:
 
     @property
     def killed(self) -> bool:
-        """Whether SIGKILL ended the child."""
-        return self._process.returncode == -signal.SIGKILL
+        """Whether SIGKILL ended the child, and not because we had lost patience."""
+        return self._process.returncode == -signal.SIGKILL and self._hung_s is None
 
     @property
     def last_words(self) -> str:
         """How the child ended."""
         code = self._process.returncode
+        if self._hung_s is not None:
+            return f"the worker did not come back within {self._hung_s:g} s"
         if code is not None and code < 0:
             return f"the worker was ended by {signal.Signals(-code).name}"
         return f"the worker ended with code {code}"
+
+    def kill_if_hung(self, patience_s: float) -> None:
+        """End the child if it has been at one thing for longer than that."""
+        if self._alive and self._current.seconds() > patience_s:
+            self._hung_s = patience_s
+            self._process.kill()
 
     def send(self, order: Order) -> None:
         """Send an order as soon as the pipe takes it."""
@@ -107,6 +117,7 @@ class WorkerProcess:
         self._orders.put(None)
         self._process.wait()
         self._sender.join()  # before its pipe's number can be another's
+        self._alive = False
         self._blamed = self._current.read()
         self._current.close()
         self._connection.close()
