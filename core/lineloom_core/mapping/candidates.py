@@ -18,6 +18,7 @@ from lineloom_core.mapping.constraint import (
     recognition_id,
     turned,
 )
+from lineloom_core.mapping.drift import reach
 from lineloom_core.mapping.joining import join
 from lineloom_core.mapping.looping import close_loops
 from lineloom_core.mapping.site_map import SiteMap
@@ -67,8 +68,7 @@ def _worth_trying(site: SiteMap, place: Place) -> list[Place]:
         if tied or near:
             continue
         distance = site.pose(other.anchor).distance(site.pose(place.anchor))
-        slack = 3.0 * site.config.join.drift_rate[0] * site.way_between(other.anchor, place.anchor)
-        if distance < 4.0 + slack:
+        if distance < 4.0 + reach(site.rough_drift(other.anchor, place.anchor)):
             chosen.append(other)
     return chosen
 

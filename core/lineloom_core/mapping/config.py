@@ -50,8 +50,7 @@ class JoinConfig:
     set whose evidence must be `distinctive` times that of any known mistake about their places.
     most_conflict: share of points in free space, beyond the places' own, over all places that
     would overlap and that drift has moved by less than `rigid_within` [m] against the set.
-    drift: growth of a track's error (m per m, rad per m) on top of (m, rad). loop_gate: sigmas
-    of drift within which a loop is believed.
+    loop_gate: sigmas of drift within which a loop is believed.
     """
 
     least_set: int = 3
@@ -62,8 +61,6 @@ class JoinConfig:
     distinctive: float = 1.3
     most_conflict: float = 0.08
     rigid_within: float = 0.1
-    drift_floor: tuple[float, float] = (0.06, 0.01)
-    drift_rate: tuple[float, float] = (0.01, 0.0008)
     loop_gate: float = 3.0
     most_candidates: int = 64
 

@@ -10,6 +10,7 @@ is not joined on looks.
 from __future__ import annotations
 
 from lineloom_core.mapping.constraint import Constraint
+from lineloom_core.mapping.drift import reach
 from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.places import Place, evidence_elsewhere
 
@@ -17,25 +18,22 @@ from lineloom_core.places import Place, evidence_elsewhere
 def is_distinctive(site: SiteMap, candidate: Constraint) -> bool:
     """Whether the match is clearly better than any mistaken one known of either place."""
     need = candidate.evidence / site.config.join.distinctive
-    return all(
-        _look_alike(site, site.places[place]) <= need
-        for place in (candidate.place_a, candidate.place_b)
+    return not any(
+        _looks_like(site, site.places[number], other, need)
+        for number in (candidate.place_a, candidate.place_b)
+        for other in site.places.values()
+        if site.same_component(other.anchor, site.places[number].anchor)
     )
 
 
-def _look_alike(site: SiteMap, place: Place) -> float:
-    """The most evidence [m] for finding the place elsewhere in its own component, or turned."""
-    most = 0.0
-    for other in site.places.values():
-        if site.same_component(other.anchor, place.anchor):
-            most = max(most, _pair(site, other, place))
-    return most
-
-
-def _pair(site: SiteMap, other: Place, place: Place) -> float:
-    """Evidence for another relative pose of two places than the one that is known."""
+def _looks_like(site: SiteMap, place: Place, other: Place, need: float) -> bool:
+    """Whether there is more evidence than `need` for another relative pose than the known one."""
     first, second = (other, place) if other.id < place.id else (place, other)
     known = site.pose(first.anchor).between(site.pose(second.anchor))
-    slack = 3.0 * site.config.join.drift_rate[0] * site.way_between(first.anchor, second.anchor)
     table = site.memory.hypotheses(first, second)
-    return evidence_elsewhere(table, known, site.config.recognition, slack=slack)
+    for drift in (site.rough_drift, site.drift):  # the second takes long and is seldom asked
+        slack = reach(drift(first.anchor, second.anchor)) if first is not second else 0.0
+        evidence = evidence_elsewhere(table, known, site.config.recognition, slack=slack)
+        if evidence <= need:
+            return False
+    return True

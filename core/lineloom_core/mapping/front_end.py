@@ -19,6 +19,7 @@ from lineloom_core.geometry import Pose
 from lineloom_core.health import without_skew
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.constraint import step_information
+from lineloom_core.mapping.drift import step_drift
 from lineloom_core.mapping.history import History
 from lineloom_core.mapping.keyframe import Keyframe, Step
 from lineloom_core.mapping.robot_record import PlacedScan, RobotRecord
@@ -172,6 +173,7 @@ def _step(history: History, record: RobotRecord, tracked: Tracked) -> Step | Non
         previous=last.id,
         T_previous_this=last.T_track_laser.between(tracked.pose),
         information=step_information(np.asarray(tracked.information), _STEP_PRIOR),
+        drift=step_drift(tracked.information, tracked.noise),
         checks={"fit": tracked.fit, "conflict_share": tracked.conflict},
     )
 

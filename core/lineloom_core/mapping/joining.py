@@ -14,13 +14,14 @@ from dataclasses import replace
 import numpy as np
 
 from lineloom_core.geometry import Pose
-from lineloom_core.graph import consistent_sets, pairwise_consistent, rigid_join
+from lineloom_core.graph import consistent_sets, optimize, pairwise_consistent, rigid_join
 from lineloom_core.mapping.changes import ComponentMerged
 from lineloom_core.mapping.constraint import CONSTRAINT_FLOOR, Constraint, turned_round
 from lineloom_core.mapping.distinctive import is_distinctive
 from lineloom_core.mapping.refusals import refuse_barred
 from lineloom_core.mapping.site_map import SiteMap
-from lineloom_core.places import Place, count_points
+from lineloom_core.mapping.usual_conflict import conflict_between, usual_conflict
+from lineloom_core.places import Place
 
 
 def join(site: SiteMap, root: int, keyframe: int) -> ComponentMerged | None:
@@ -33,11 +34,12 @@ def join(site: SiteMap, root: int, keyframe: int) -> ComponentMerged | None:
     if objection:
         _wait(site, candidates, objection)
         return None
-    members_a = {n: site.pose(n) for n in site.graph.component_of(a_root)}
-    members_b = {n: site.pose(n) for n in site.graph.component_of(b_root)}
-    T_A_B = rigid_join(members_a, members_b, [c.edge() for c in chosen])
-    share = _conflict_share(site, chosen, T_A_B)
-    if share > site.config.join.most_conflict:
+    T_A_B, together = _solved_together(site, a_root, b_root, chosen)
+    near_a = _places_near(site, [c.keyframe_a for c in chosen])
+    near_b = _places_near(site, [c.keyframe_b for c in chosen])
+    share = _conflict_share(site, near_a, near_b, together)
+    usual = 0.5 * (usual_conflict(site, near_a) + usual_conflict(site, near_b))
+    if share > site.config.join.most_conflict + usual:
         _wait(site, chosen, f"the maps contradict each other there ({100 * share:.0f} %)")
         return None
     merged = _accept(site, chosen, b_root, T_A_B, _figures(site, chosen, rival, share))
@@ -138,34 +140,54 @@ def _objection_to_set(site: SiteMap, chosen: list[Constraint], rival: list[Const
     return ""
 
 
-def _conflict_share(site: SiteMap, chosen: list[Constraint], T_A_B: Pose) -> float:
-    """Free-space conflict, beyond the places' own, over all that would overlap near the set.
+def _solved_together(
+    site: SiteMap, a_root: int, b_root: int, chosen: list[Constraint]
+) -> tuple[Pose, dict[int, Pose]]:
+    """T_A_B, and all poses in a's frame as they would be if the set were believed.
 
-    Near: as far as drift lets the two maps be compared as rigid pieces.
+    Both maps have drifted: held against each other as rigid pieces, right ones would collide.
     """
-    near_a = _places_near(site, [c.keyframe_a for c in chosen])
-    near_b = _places_near(site, [c.keyframe_b for c in chosen])
-    matched = conflict = 0.0
-    for a in near_a:
-        for b in near_b:
-            T_a_b = site.pose(a.anchor).between(T_A_B @ site.pose(b.anchor))
-            if np.hypot(T_a_b.x, T_a_b.y) > site.config.places.span:
-                continue
-            m, c = count_points(a, b, T_a_b)
-            matched += m
-            conflict += max(c - (a.own_conflict + b.own_conflict) * (m + c), 0.0)
-    return conflict / max(matched + conflict, 1.0)
+    nodes_a, edges_a = site.graph.component_subgraph(a_root)
+    nodes_b, edges_b = site.graph.component_subgraph(b_root)
+    between = [c.edge() for c in chosen]
+    T_A_B = rigid_join(nodes_a, nodes_b, between)
+    nodes = {**nodes_a, **{n: T_A_B @ pose for n, pose in nodes_b.items()}}
+    solution = optimize(nodes, [*edges_a, *edges_b, *between], anchors=(a_root,))
+    return T_A_B, solution.poses
+
+
+def _conflict_share(
+    site: SiteMap, near_a: list[Place], near_b: list[Place], poses: dict[int, Pose]
+) -> float:
+    """Free-space conflict, beyond the places' own, over all that would overlap near the set."""
+    pairs = [
+        (a, b, poses[a.anchor].between(poses[b.anchor]))
+        for a in near_a
+        for b in near_b
+        if poses[a.anchor].distance(poses[b.anchor]) <= site.config.places.span
+    ]
+    return conflict_between(pairs)
 
 
 def _places_near(site: SiteMap, keyframes: list[int]) -> list[Place]:
-    """Places of the component whose drift against the nearest of the keyframes is small."""
+    """Places of the component that lie firmly against the nearest of the keyframes.
+
+    As far, that is, as drift lets the two maps be compared at all.
+    """
     most = site.config.join.rigid_within**2
     return [
         place
         for place in site.places.values()
         if site.same_component(place.anchor, keyframes[0])
-        and min(site.drift(k, place.anchor)[0, 0] for k in keyframes) <= most
+        and min(_looseness(site, k, place.anchor) for k in keyframes) <= most
     ]
+
+
+def _looseness(site: SiteMap, matched: int, place: int) -> float:
+    """Variance of a place's position [m^2] where a keyframe of its component is matched."""
+    lever = site.pose(matched).distance(site.pose(place))
+    drift = site.drift(matched, place)
+    return float(0.5 * (drift[0, 0] + drift[1, 1]) + CONSTRAINT_FLOOR[2, 2] * lever**2)
 
 
 def _drop_others(site: SiteMap, candidates: list[Constraint], chosen: list[Constraint]) -> None:

@@ -19,12 +19,14 @@ from lineloom_core.scan import Scan
 class Step:
     """How a keyframe was tracked from the one before it on its track.
 
-    T_previous_this; information: 3x3 in the tangent at this one; checks: the tracker's figures.
+    T_previous_this; information: 3x3 in the tangent at this one, as the graph takes it; drift:
+    covariance there, as measured; checks: the tracker's figures.
     """
 
     previous: int
     T_previous_this: Pose
     information: NDArray[np.float64]
+    drift: NDArray[np.float64]
     checks: dict[str, float]
 
 

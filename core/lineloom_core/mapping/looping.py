@@ -10,6 +10,7 @@ import numpy as np
 
 from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.mapping.constraint import CONSTRAINT_FLOOR, Constraint
+from lineloom_core.mapping.drift import reach
 from lineloom_core.mapping.refusals import refuse_barred
 from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.places import Place
@@ -68,8 +69,10 @@ def _loops_agree(site: SiteMap, c: Constraint, o: Constraint) -> bool:
     )
     at = site.pose(c.keyframe_b)
     off = (T_c @ at).between(T_o @ at)
-    slack = 0.3 + 3.0 * site.config.join.drift_rate[0] * (
-        site.way_between(c.keyframe_a, o.keyframe_a) + site.way_between(c.keyframe_b, o.keyframe_b)
+    slack = (
+        0.3
+        + reach(site.drift(c.keyframe_a, o.keyframe_a))
+        + reach(site.drift(c.keyframe_b, o.keyframe_b))
     )
     return bool(np.hypot(off.x, off.y) < slack and abs(angle_difference(off.theta, 0.0)) < 0.1)
 

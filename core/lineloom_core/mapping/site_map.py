@@ -5,7 +5,6 @@ A function of the history gone through so far and of the verdicts upon it: `rebu
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,8 @@ from lineloom_core.geometry import Pose
 from lineloom_core.graph import PoseGraph, optimize
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.constraint import Constraint, step_id
+from lineloom_core.mapping.drift import way_drift
+from lineloom_core.mapping.graph_drift import GraphDrift
 from lineloom_core.mapping.keyframe import Keyframe
 from lineloom_core.mapping.memory import Memory
 from lineloom_core.mapping.place_making import make_place
@@ -49,13 +50,17 @@ class SiteMap:
         """Version of the latest keyframe: when what is decided now is decided."""
         self._track_of: dict[int, Track] = {}
         self._positions = Positions()
+        self._graph_drift = GraphDrift(self.graph, self.keyframes)
 
     def __getstate__(self) -> dict[str, Any]:
         """Places are functions of their keyframes and by far the largest part: left out."""
-        return {**self.__dict__, "places": [p.keyframes for p in self.places.values()]}
+        state = {**self.__dict__, "places": [p.keyframes for p in self.places.values()]}
+        del state["_graph_drift"]
+        return state
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
+        self._graph_drift = GraphDrift(self.graph, self.keyframes)
         self.places = {}
         for members in state["places"]:
             self.add_place(members)
@@ -71,13 +76,13 @@ class SiteMap:
         if step is None or self.verdicts.barred(step_id(keyframe.id)):
             name = str(keyframe.track) if step is None else f"{keyframe.track}.{keyframe.id}"
             track = self.tracks[name] = Track(name, keyframe.robot)
-            track.append(keyframe.id, 0.0)
+            track.append(keyframe.id, Pose.identity(), np.zeros((3, 3)))
             self._track_of[keyframe.id] = track
             self.add_node(keyframe.id, Pose.identity())
             return None
         track = self._track_of[step.previous]
         T = step.T_previous_this
-        track.append(keyframe.id, float(np.hypot(T.x, T.y)))
+        track.append(keyframe.id, T, step.drift)
         self._track_of[keyframe.id] = track
         self.add_node(keyframe.id, self.pose(step.previous) @ T)
         constraint = Constraint(
@@ -143,23 +148,32 @@ class SiteMap:
     def driven_between(self, a: int, b: int) -> float:
         """Metres driven from one keyframe to another of the same track."""
         track = self._track_of[a]
-        return abs(_travelled(track, a) - _travelled(track, b))
+        return abs(track.travelled[track.position(a)] - track.travelled[track.position(b)])
 
     def drift(self, a: int, b: int) -> NDArray[np.float64]:
         """Covariance (3, 3) of T_a_b within one component, in the tangent at b."""
         if a == b:
             return np.zeros((3, 3))
-        join = self.config.join
-        way = self.way_between(a, b)
-        theta = join.drift_rate[1] * way
-        across = join.drift_rate[0] * way + 0.5 * theta * self.pose(a).distance(self.pose(b))
-        return np.diag([across**2, across**2, theta**2])
+        track = self._track_of[a]
+        if self.same_track(a, b) and track.id not in self.looped_tracks:
+            return track.drift(a, b)
+        return self._graph_drift.between(a, b)
+
+    def rough_drift(self, a: int, b: int) -> NDArray[np.float64]:
+        """The same at a glance, by `way_between` and the mean rates of the two tracks.
+
+        Too small where two maps have met at one end only: for prefilters alone.
+        """
+        first, last = self._track_of[a].drift_rates(), self._track_of[b].drift_rates()
+        rates = 0.5 * (first[0] + last[0]), 0.5 * (first[1] + last[1])
+        return way_drift(rates, self.way_between(a, b), self.pose(a).distance(self.pose(b)))
 
     def add_constraint(self, constraint: Constraint) -> None:
         """Remember a constraint; an accepted one goes into the graph."""
         if not constraint.history:
             constraint = constraint.moved_to(constraint.state, constraint.reason, self.now)
         self.constraints[constraint.id] = constraint
+        self._graph_drift.forget()
         in_graph = constraint.id in self.graph.edges
         if constraint.state == "accepted" and not in_graph:
             self.graph.add_edge(constraint.edge())
@@ -177,6 +191,7 @@ class SiteMap:
     def move_component(self, keyframe: int, T_new_old: Pose) -> None:
         """Move the component of a keyframe rigidly: into the frame of the one it joins."""
         self.graph.move_component(keyframe, T_new_old)
+        self._graph_drift.forget()
         self._positions.reset(self.graph.nodes)
 
     def optimise(self, keyframe: int) -> None:
@@ -184,6 +199,7 @@ class SiteMap:
         nodes, edges = self.graph.component_subgraph(keyframe)
         solution = optimize(nodes, edges, anchors=(min(nodes),))
         self.graph.set_poses(solution.poses)
+        self._graph_drift.forget()
         self._positions.reset(self.graph.nodes)
 
     def places_in_component(self, keyframe: int) -> int:
@@ -202,16 +218,8 @@ class SiteMap:
 
     def neighbours_on_track(self, keyframe: int, reach: int) -> list[int]:
         """The keyframe and up to `reach` before and after it on its track, itself first."""
-        chain = self._track_of[keyframe].keyframes
-        where = _position(chain, keyframe)
+        track = self._track_of[keyframe]
+        chain = track.keyframes
+        where = track.position(keyframe)
         around = chain[max(where - reach, 0) : where + reach + 1]
-        return sorted(around, key=lambda k: (abs(_position(chain, k) - where), k))
-
-
-def _travelled(track: Track, keyframe: int) -> float:
-    return track.travelled[_position(track.keyframes, keyframe)]
-
-
-def _position(chain: list[int], keyframe: int) -> int:
-    """Index of a keyframe in its chain, which ascends."""
-    return bisect_left(chain, keyframe)
+        return sorted(around, key=lambda k: (abs(track.position(k) - where), k))

@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from bisect import bisect_left
 from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lineloom_core.geometry import Pose
+from lineloom_core.mapping.drift import Chain
 
 
 @dataclass
@@ -20,8 +28,26 @@ class Track:
     """Distance driven up to each keyframe [m]."""
     last_place_at: float = 0.0
     """Distance driven when the last place was made [m]."""
+    chain: Chain = field(default_factory=Chain)
+    """How its error grew."""
 
-    def append(self, keyframe: int, step: float) -> None:
-        """Add the next keyframe, `step` metres further on."""
-        self.travelled.append(self.travelled[-1] + step if self.travelled else 0.0)
+    def append(self, keyframe: int, step: Pose, drift: NDArray[np.float64]) -> None:
+        """Add the next keyframe: T_previous_this and its covariance."""
+        way = math.hypot(step.x, step.y)
+        self.travelled.append(self.travelled[-1] + way if self.travelled else 0.0)
         self.keyframes.append(keyframe)
+        self.chain.append(step, drift)
+
+    def position(self, keyframe: int) -> int:
+        """Index of a keyframe in the track, whose ids ascend."""
+        return bisect_left(self.keyframes, keyframe)
+
+    def drift(self, a: int, b: int) -> NDArray[np.float64]:
+        """Covariance (3, 3) of T_a_b, two of its keyframes, by tracking alone."""
+        return self.chain.between(self.position(a), self.position(b))
+
+    def drift_rates(self) -> tuple[float, float]:
+        """Variance added per metre on average, m^2 and rad^2."""
+        position, heading = self.chain.spread
+        way = max(self.travelled[-1], 1.0)
+        return position / way, heading / way

@@ -27,9 +27,12 @@ from numpy.typing import NDArray
 from lineloom_core.features import ScanFeatures
 from lineloom_core.geometry import Pose
 from lineloom_core.graph import observe, project_out_weak
+from lineloom_core.mapping.drift import NoiseFigure
 from lineloom_core.matching.free_space import judge_sweeps
 from lineloom_core.matching.local_map import Cloud, LocalMap, Registration
 from lineloom_core.timing import timed
+
+_SMOOTHING_S = 0.3
 
 Status = Literal["first", "tracked", "skipped", "lost"]
 
@@ -74,6 +77,8 @@ class Tracked:
     information: NDArray[np.float64]
     fit: float
     conflict: float
+    noise: float = 1.0
+    """The robot's noise figure so far (see `drift`)."""
 
 
 class Tracker:
@@ -87,9 +92,11 @@ class Tracker:
         self._pose = Pose.identity()
         self._twist = np.zeros(3)  # m/s, m/s, rad/s in the laser's axes
         self._twist_span = 0.0  # s over which it was measured
+        self._turn_rate = 0.0
         self._stamp = 0.0
         self._odometry: Pose | None = None
         self._misses = 0
+        self._noise = NoiseFigure()
 
     def __getstate__(self) -> dict[str, Any]:
         """The local map is a function of the recent keyframes: left out."""
@@ -102,8 +109,11 @@ class Tracker:
 
     @property
     def turn_rate(self) -> float:
-        """Turn rate of the last step [rad/s], 0 where it is not known."""
-        return float(self._twist[2])
+        """Turn rate over the last few steps [rad/s], 0 where it is not known.
+
+        Smoothed: a single step's is mostly noise, and would wind up the next sweep.
+        """
+        return self._turn_rate
 
     @timed("track")
     def track(
@@ -133,8 +143,12 @@ class Tracker:
             or found.fit < config.enough_fit
         )
         if is_keyframe:
+            self._measure_noise(cloud, found.pose)
             self._add_keyframe(features, cloud)
-        return Tracked("tracked", found.pose, is_keyframe, _in_own_axes(held), found.fit, conflict)
+        information = _in_own_axes(held)
+        return Tracked(
+            "tracked", found.pose, is_keyframe, information, found.fit, conflict, self._noise.value
+        )
 
     def _predict(self, stamp: float, odometry: Pose | None) -> list[Pose]:
         """Where the robot may be: same velocity, and what its wheels say."""
@@ -170,14 +184,22 @@ class Tracker:
         T_keyframe_laser = self._recent[-1][1].between(pose)
         return judge_sweeps(self._keyframe_features, features, T_keyframe_laser).conflict_share
 
+    def _measure_noise(self, cloud: Cloud, pose: Pose) -> None:
+        assert self._map is not None
+        disagreement = self._map.disagreement(cloud, pose)
+        if disagreement is not None:
+            self._noise.add(disagreement)
+
     def _accept(self, pose: Pose, stamp: float, odometry: Pose | None, *, moved_to: Pose) -> None:
         """Take a pose. Velocity is that to `moved_to`: a slide that noise chose must not go on."""
         dt = stamp - self._stamp
         if 0.01 < dt < 1.0:  # steps of zero or less occur in real logs
             self._twist = self._pose.between(moved_to).to_array() / dt
             self._twist_span = dt
+            share = dt / (dt + _SMOOTHING_S)
+            self._turn_rate += share * (float(self._twist[2]) - self._turn_rate)
         elif dt >= 1.0:
-            self._twist = np.zeros(3)
+            self._twist, self._turn_rate = np.zeros(3), 0.0
         self._pose, self._stamp, self._odometry = pose, stamp, odometry
 
     def _add_keyframe(self, features: ScanFeatures, cloud: Cloud) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from lineloom_core.features import ExtractionConfig
 from lineloom_core.geometry import Pose
 from lineloom_core.mapping.constraint import Constraint, step_information
+from lineloom_core.mapping.drift import step_drift
 from lineloom_core.mapping.keyframe import Keyframe, Step
 from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.places import Place
@@ -39,7 +40,7 @@ def lay_track(
         if number > first:
             T = poses[number - 1 - first].between(pose)
             information = step_information(np.diag([1e6, 1e6, 1e7]), (0.15, 0.05))
-            step = Step(number - 1, T, information, {})
+            step = Step(number - 1, T, information, step_drift(information, 1.0), {})
         site.append(
             Keyframe(
                 id=number,
