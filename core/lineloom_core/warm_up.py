@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from lineloom_core.fusion.occupancy import rasterise
 from lineloom_core.mapping.site_mapper import SiteMapper
 from lineloom_core.matching import LineMatcher
 from lineloom_core.scan import Scan
@@ -18,7 +19,8 @@ def warm_up() -> None:
     for scan in scans:
         mapper.add("a", scan)
         mapper.add("b", scan)
-    mapper.view()
+    view = mapper.view()
+    rasterise(mapper.rays(view.components[0].id), np.array([[0.0, 0.0, 1.0, 1.0]]))
     LineMatcher().match(scans[0], scans[2])
 
 

@@ -23,7 +23,9 @@ from lineloom_service.map_files import FramedView, ray_source
 from lineloom_service.service import Service
 from lineloom_service.store.records import SiteRecord
 
-AlignQuery = Annotated[bool, Query(description="Turned so that walls run along the axes.")]
+AlignQuery = Annotated[
+    bool, Query(description="Turned so that walls run along the axes; not with frame=plan.")
+]
 FrameQuery = Annotated[
     MapFrame, Query(description="In the map's own coordinates, or the floor plan's.")
 ]
@@ -40,14 +42,13 @@ async def in_frame(
 ) -> FramedView:
     """Return the view in the frame asked for. Raises ProblemError where there is none such.
 
-    In the plan's frame only those components are shown that have a place there.
+    In the plan's frame only those components are shown that have a place there, and the plan says
+    how they are turned: `align` has nothing to add.
     """
     if frame == "map":
         return await asyncio.to_thread(_aligned, view) if align else FramedView(view)
     if frame != "plan":
         raise ProblemError(INVALID_PARAMETER, f"frame: must be map or plan, not {frame!r}")
-    if align:
-        raise ProblemError(INVALID_PARAMETER, "align: the floor plan says how the map lies")
     return await _in_plan(service, site, view, component)
 
 

@@ -74,7 +74,7 @@ async def test_nav2_is_of_one_component(client: httpx.AsyncClient) -> None:
 async def test_frames_that_there_are_not(client: httpx.AsyncClient) -> None:
     expect_problem(await client.get(f"{SITE}/map?frame=moon"), 422, "invalid-parameter")
     expect_problem(await client.get(f"{SITE}/map?frame=plan"), 404, "no-floor-plan")
-    expect_problem(await client.get(f"{SITE}/map?frame=plan&align=true"), 422, "invalid-parameter")
+    expect_problem(await client.get(f"{SITE}/map?frame=plan&align=true"), 404, "no-floor-plan")
     aligned = (await client.get(f"{SITE}/map?align=true")).json()
     for path in ("robots/a/trajectory", "graph"):
         expect_problem(await client.get(f"{SITE}/{path}?frame=plan"), 404, "no-floor-plan")
