@@ -25,8 +25,8 @@ _SITE = f"/v1/sites/{SITE}"
 class FakeServer:
     """What the tests turn: the site, whether there is one, and who may see it."""
 
-    def __init__(self) -> None:
-        self.site = FakeSite()
+    def __init__(self, site: FakeSite | None = None) -> None:
+        self.site = site or FakeSite()
         self.exists = True
         self.wants_token = False
         self.streams = True
@@ -164,9 +164,9 @@ def _problem(status: int, detail: str) -> Response:
 
 
 @contextlib.contextmanager
-def fake_server() -> Iterator[FakeServer]:
+def fake_server(site: FakeSite | None = None) -> Iterator[FakeServer]:
     """A server that is stopped in the end."""
-    server = FakeServer()
+    server = FakeServer(site)
     server.start()
     try:
         yield server

@@ -27,7 +27,7 @@ def drive() -> list[SimulatedScan]:
 @pytest.fixture(scope="module")
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ChildService]:
     with ChildService(tmp_path_factory.mktemp("service")) as started:
-        started.wait_until_ready()
+        started.wait_until_ready(timeout=300.0)
         yield started
 
 

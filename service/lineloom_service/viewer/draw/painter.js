@@ -2,7 +2,7 @@ import { apply } from "../geometry/pose.js";
 import { constraintEnds } from "./constraint_marks.js";
 
 /** Pieces drawn between two looks at the clock. */
-const CHUNK = 1500;
+const CHUNK = 800;
 
 /**
  * @typedef {import("../data/site_state.js").SiteState} SiteState

@@ -3,7 +3,7 @@ import { paint } from "./painter.js";
 /** How much larger than the view the picture is on every side, as a share of the view. */
 const MARGIN = 0.25;
 /** Milliseconds of a frame that may go into drawing the next picture. */
-const BUDGET_MS = 9;
+const BUDGET_MS = 7;
 /** Lines that are drawn within one frame where it matters. */
 const HURRIED_LINES = 15000;
 
@@ -58,7 +58,9 @@ export class Picture {
     const end = this._hurried ? Infinity : performance.now() + BUDGET_MS;
     this._hurried = false;
     while (this._job) {
-      if (this._job.next().done) {
+      const { done } = this._job.next();
+      this._back.settle();
+      if (done) {
         this._job = null;
         [this._front, this._back] = [this._back, this._front];
         return;
@@ -74,7 +76,7 @@ class Sheet {
     this.canvas = document.createElement("canvas");
     this.canvas.width = 1;
     this.canvas.height = 1;
-    this.context = /** @type {CanvasRenderingContext2D} */ (this.canvas.getContext("2d"));
+    this.context = /** @type {CanvasRenderingContext2D} */ (this.canvas.getContext("2d", { willReadFrequently: true }));
     this.view = { x: 0, y: 0, scale: 0, width: 1, height: 1 };
     this.ratio = 1;
   }
@@ -93,6 +95,14 @@ class Sheet {
     this.context.setTransform(ratio, 0, 0, ratio, 0, 0);
     this.view = { x: camera.x, y: camera.y, scale: camera.scale, width, height };
     this.ratio = ratio;
+  }
+
+  /**
+   * Have what was drawn so far really drawn: browsers put it off until a canvas is looked at, and
+   * would then do it all in one frame, whatever the clock said before.
+   */
+  settle() {
+    this.context.getImageData(0, 0, 1, 1);
   }
 
   /** Tell whether the sheet shows all that the camera sees, in its sharpness. @param {import("./camera.js").Camera} camera @param {number} ratio */

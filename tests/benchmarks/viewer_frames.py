@@ -1,0 +1,145 @@
+"""`python -m tests.benchmarks.viewer_frames`: how smooth the viewer is with 100,000 lines.
+
+Headless Chromium, drawing in software. The baseline is the plain way: every line stroked again for
+every frame.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import shutil
+import sys
+from typing import Any
+
+import numpy as np
+from playwright.sync_api import Page, sync_playwright
+
+from tests.viewer.conftest import CHROMIUM_FLAGS, DESKTOP
+from tests.viewer.fake_server import fake_server
+from tests.viewer.fake_site import SITE, FakeSite
+from tests.viewer.viewer_page import open_viewer
+
+GOAL = 30.0
+"""Frames a second that count as smooth."""
+
+_DRIVE = """
+async (seconds) => {
+    const { view, control } = lineloom;
+    const [width, height] = [view.camera.width, view.camera.height];
+    const drive = {
+        pan: (i) => control._pan(7 * Math.cos(i / 25), 5 * Math.sin(i / 25)),
+        zoom: (i) => control._zoom(Math.exp(0.03 * Math.sin(i / 20)), width / 2, height / 2),
+    };
+    const frame = () => new Promise((resolve) => requestAnimationFrame(resolve));
+    const results = {};
+    for (const [name, move] of Object.entries(drive)) {
+        control.fit();
+        control._zoom(1.5, width / 2, height / 2);
+        for (let i = 0; i < 60; i++) await frame();
+        const gaps = [];
+        let last = await frame();
+        const end = last + 1000 * seconds;
+        for (let i = 0; last < end; i++) {
+            move(i);
+            const now = await frame();
+            gaps.push(now - last);
+            last = now;
+        }
+        results[name] = gaps;
+    }
+    return results;
+}
+"""
+
+_PLAIN = """
+async (seconds) => {
+    const { view } = lineloom;
+    const { camera } = view;
+    const context = view.canvas.getContext("2d");
+    const { ends, length } = view.state.lines;
+    const frame = () => new Promise((resolve) => requestAnimationFrame(resolve));
+    const gaps = [];
+    let last = await frame();
+    const end = last + 1000 * seconds;
+    for (let i = 0; last < end; i++) {
+        camera.pan(7 * Math.cos(i / 25), 5 * Math.sin(i / 25));
+        context.fillStyle = "#fff";
+        context.fillRect(0, 0, camera.width, camera.height);
+        context.lineWidth = 1.5;
+        context.beginPath();
+        for (let k = 0; k < length; k++) {
+            const p = camera.toScreen(ends[4 * k], ends[4 * k + 1]);
+            const q = camera.toScreen(ends[4 * k + 2], ends[4 * k + 3]);
+            context.moveTo(p.x, p.y);
+            context.lineTo(q.x, q.y);
+        }
+        context.stroke();
+        context.getImageData(0, 0, 1, 1);
+        const now = await frame();
+        gaps.push(now - last);
+        last = now;
+    }
+    return { "every line in every frame, pan": gaps };
+}
+"""
+
+
+class LargeSite(FakeSite):
+    """The fake site with a map as large as one likes."""
+
+    def __init__(self, count: int) -> None:
+        super().__init__()
+        rng = np.random.default_rng(0)
+        side = 1.2 * math.sqrt(count)
+        start = rng.uniform(0.0, side, (count, 2))
+        length = rng.exponential(1.5, count)
+        angle = rng.integers(0, 4, count) * math.pi / 2 + rng.normal(0.0, 0.02, count)
+        end = start + length[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        support = rng.integers(1, 12, count)
+        template = super().map()["lines"][0]
+        self._lines = [
+            template
+            | {"id": f"l{i}", "x1": x1, "y1": y1, "x2": x2, "y2": y2, "support": int(s)}
+            | {"robots": ["ada"] if i % 3 else ["ada", "bob"]}
+            for i, ((x1, y1), (x2, y2), s) in enumerate(
+                zip(start.tolist(), end.tolist(), support, strict=True)
+            )
+        ]
+
+    def map(self) -> dict[str, Any]:
+        """`GET …/map`."""
+        return super().map() | {"lines": self._lines}
+
+
+def main() -> int:
+    """Print frames a second; exit code 1 where the viewer is not smooth."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--lines", type=int, default=100_000)
+    parser.add_argument("--seconds", type=float, default=4.0)
+    options = parser.parse_args()
+    path = shutil.which("chromium")
+    if path is None:
+        sys.exit("no Chromium: on Debian, apt-get install chromium")
+    with fake_server(LargeSite(options.lines)) as server, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=CHROMIUM_FLAGS)
+        page = browser.new_page(viewport=DESKTOP)  # type: ignore[arg-type]
+        page.set_default_timeout(120_000)
+        open_viewer(page, server.url, SITE)
+        print(f"{options.lines} lines, {DESKTOP['width']} x {DESKTOP['height']} pixels")
+        rates = _measure(page, _DRIVE, options.seconds) | _measure(page, _PLAIN, options.seconds)
+        browser.close()
+    return 0 if min(rates["pan"], rates["zoom"]) >= GOAL else 1
+
+
+def _measure(page: Page, drive: str, seconds: float) -> dict[str, float]:
+    rates = {}
+    for name, gaps in page.evaluate(drive, seconds).items():
+        rates[name] = 1000.0 * len(gaps) / sum(gaps)
+        worst = float(np.percentile(gaps, 95))
+        print(f"{name:<32} {rates[name]:6.1f} frames/s, 95 % of frames within {worst:5.1f} ms")
+    return rates
+
+
+if __name__ == "__main__":
+    sys.exit(main())
