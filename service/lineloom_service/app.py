@@ -11,6 +11,7 @@ from fastapi.middleware.cors import CORSMiddleware
 from lineloom_service import __version__, errors, openapi
 from lineloom_service.dependencies import admitted
 from lineloom_service.observation.requests import RequestObserver
+from lineloom_service.pacing import IngestPacing
 from lineloom_service.routes import OPEN_ROUTERS, ROUTERS, allowed_methods, docs, viewer
 from lineloom_service.security.headers import SecurityHeaders
 from lineloom_service.service import Service
@@ -53,6 +54,7 @@ def create_app(settings: Settings | None = None, *, service: Service | None = No
     viewer.mount(app)
     if served.settings.allow_origins:
         _allow_origins(app, served.settings.allow_origins)
+    app.add_middleware(IngestPacing, pacer=served.pacer)
     # The last one added is the outermost.
     app.add_middleware(RequestObserver, metrics=served.metrics)
     app.add_middleware(SecurityHeaders)

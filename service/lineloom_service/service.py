@@ -17,6 +17,7 @@ from lineloom_service.maps.map_store import MapStore
 from lineloom_service.matching import PairMatcher
 from lineloom_service.observation.latency import Latency
 from lineloom_service.observation.metrics import Metrics, SiteFigures
+from lineloom_service.pacing import Pacer
 from lineloom_service.security.guard import Guard
 from lineloom_service.settings import Settings
 from lineloom_service.store.choice import database_at
@@ -50,6 +51,7 @@ class Service:
             self.store, self.events, lineloom_core.__version__, settings.event_history
         )
         self.conductor = Conductor(self.store, self.engine, settings, recorder)
+        self.pacer = Pacer()
         self.maps = MapStore(settings.map_cache_bytes)
         self.store.subscribe_news(self._on_news)
         self.matcher = PairMatcher()

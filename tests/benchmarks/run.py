@@ -19,7 +19,9 @@ from lineloom_core.warm_up import warm_up
 from tests.benchmarks.drives import driving
 from tests.benchmarks.ingest import ingesting
 from tests.benchmarks.map_files import occupancy
+from tests.benchmarks.queries import queries
 from tests.benchmarks.row import Row, table
+from tests.benchmarks.scans import csail
 from tests.benchmarks.single_scans import extraction, matching
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
@@ -42,7 +44,12 @@ def measure(data: Path, *, quick: bool, http: bool) -> list[Row]:
         _tell(f"no drives and no real pairs: {data} is missing")
         return rows
     _tell("drives")
-    return rows + driving(data, quick=quick, http=http)
+    rows += driving(data, quick=quick, http=http)
+    scans = csail(data, 300 if quick else None)
+    if http and scans is not None:
+        _tell("queries under load")
+        rows += queries(scans, quick=quick)
+    return rows
 
 
 def as_json(rows: list[Row]) -> str:

@@ -32,6 +32,7 @@ async def post_scans(
     appended = await service.store.append_scans(
         site, robot, intake.scans, processed=processed, limit=settings.backlog_limit
     )
+    await service.pacer.turn()  # all that shared the commit come back at once
     service.metrics.count_scans(site, appended.accepted, appended.duplicates)
     for refused in intake.rejected:
         service.metrics.count_refused_scan(refused.reason.partition(":")[0].partition("/")[0])
