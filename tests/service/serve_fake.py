@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import sys
 from pathlib import Path
 
@@ -16,7 +17,8 @@ from lineloom_service.settings import Settings
 
 async def _serve(directory: Path, port: int) -> None:
     settings = Settings(data_dir=directory, gap_window_s=0.2, snapshot_every=100, port=port)
-    engine = LocalEngine(1, publish_every_s=0.1, mapper="fake_mapper:FakeMapper", warm_up=None)
+    mapper = os.environ.get("SERVER_MAPPER", "fake_mapper:FakeMapper")
+    engine = LocalEngine(1, publish_every_s=0.1, mapper=mapper, warm_up=None)
     service = Service(settings, engine=engine)
     await service.start()
     try:

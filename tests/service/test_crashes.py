@@ -1,0 +1,190 @@
+"""Killed again and again at random points under load: nothing acknowledged is lost, same map."""
+
+from __future__ import annotations
+
+import asyncio
+import importlib
+import os
+import random
+import signal
+import subprocess
+from collections.abc import Callable, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from lineloom_core.io.jsonl import ScanRecord, record_to_json
+from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.simulation import Fleet
+from lineloom_service.engine.mapper import SITE_MAPPER, Mapper, apply, load
+from lineloom_service.store.records import LogEntry
+from lineloom_service.store.sql_store import SqlStore
+from lineloom_service.store.sqlite_database import SqliteDatabase
+
+from tests.service.fake_server import free_port, server
+
+FAKE = "fake_mapper:FakeMapper"
+STREAMS = (("alone", "r"), ("shared", "r1"), ("shared", "r2"))
+
+_NOT_POSTED = ("robot", "truth", "odometry")
+
+Scans = Callable[[int], dict[str, Any]]
+
+
+def _plain_scan(seq: int) -> dict[str, Any]:
+    return {
+        "seq": seq,
+        "stamp": float(seq % 500),
+        "angle_min": -1.0,
+        "angle_increment": 0.1,
+        "range_min": 0.1,
+        "range_max": 30.0,
+        "ranges": [1.0 + 0.01 * (seq % 97)] * 20,
+    }
+
+
+async def _send(port: int, acknowledged: dict[tuple[str, str], int], scan: Scans) -> None:
+    """Every robot sends scan after scan, each until acknowledged, until the server is gone."""
+
+    async def robot(stream: tuple[str, str], client: httpx.AsyncClient) -> None:
+        url = f"http://127.0.0.1:{port}/v1/sites/{stream[0]}/robots/{stream[1]}/scans"
+        while True:
+            try:
+                response = await client.post(url, json=scan(acknowledged[stream]))
+            except httpx.TransportError:
+                return
+            assert response.status_code == 202, response.text
+            acknowledged[stream] += 1
+            await asyncio.sleep(0.002)
+
+    async with httpx.AsyncClient(timeout=60.0) as client:
+        await asyncio.gather(*(robot(stream, client) for stream in STREAMS))
+
+
+async def _disturb(
+    port: int,
+    process: subprocess.Popen[bytes],
+    rng: random.Random,
+    acknowledged: dict[tuple[str, str], int],
+    scan: Scans,
+) -> int:
+    """Send, kill some workers on the way, then the server; return the number of kills."""
+    sending = asyncio.create_task(_send(port, acknowledged, scan))
+    kills = 0
+    for _ in range(rng.randrange(3)):
+        await _progress(acknowledged, rng.randrange(1, 60))
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+        if children:
+            os.kill(int(rng.choice(children)), signal.SIGKILL)
+            kills += 1
+    await _progress(acknowledged, rng.randrange(1, 60))
+    process.send_signal(signal.SIGKILL)
+    await sending
+    return kills + 1
+
+
+async def _progress(acknowledged: dict[tuple[str, str], int], more: int) -> None:
+    goal = sum(acknowledged.values()) + more
+    for _ in range(60_000):
+        if sum(acknowledged.values()) >= goal:
+            return
+        await asyncio.sleep(0.002)
+    raise AssertionError(f"no progress beyond {acknowledged}")
+
+
+async def _maps(port: int) -> dict[str, Any]:
+    """Wait until all is mapped; lines and trajectories of every site."""
+    async with httpx.AsyncClient(base_url=f"http://127.0.0.1:{port}/v1/sites") as client:
+        for _ in range(3000):
+            sites = [(await client.get(f"/{site}")).json() for site in ("alone", "shared")]
+            if all(site.get("idle") for site in sites):
+                break
+            await asyncio.sleep(0.05)
+        assert all(site["idle"] for site in sites), sites
+        lines = {
+            site: (await client.get(f"/{site}/map")).json()["lines"] for site in ("alone", "shared")
+        }
+        poses = {
+            f"{site}/{robot}": (await client.get(f"/{site}/robots/{robot}/trajectory")).json()[
+                "poses"
+            ]
+            for site, robot in STREAMS
+        }
+    return {"lines": lines, "poses": poses}
+
+
+async def _log(directory: Path) -> dict[str, list[LogEntry]]:
+    store = SqlStore(SqliteDatabase(directory / "lineloom.db"), gap_window_s=9.0, max_held=100)
+    await store.open()
+    logs = {}
+    for record in await store.sites():
+        assert await store.skips(record.id) == []
+        logs[record.name] = await store.read_feed(record.id, 0, 10**6)
+    await store.close()
+    return logs
+
+
+def _undisturbed(mapper: str, entries: Sequence[LogEntry]) -> SiteView:
+    """What a mapper makes of the log that nobody ever kills."""
+    fed: Mapper = load(mapper)()
+    for entry in entries:
+        apply(fed, entry)
+    return fed.view()
+
+
+def _run(directory: Path, mapper: str, seed: int, lives: int, scan: Scans) -> int:
+    rng = random.Random(seed)
+    port, kills = free_port(), 0
+    acknowledged = dict.fromkeys(STREAMS, 0)
+    environment = {"SERVER_MAPPER": mapper, "FAKE_MAPPER_SECONDS": "0.001"}
+    for _ in range(lives):
+        with server(directory, port, **environment) as process:
+            kills += asyncio.run(_disturb(port, process, rng, acknowledged, scan))
+    with server(directory, port, **environment) as process:
+        maps = asyncio.run(_maps(port))
+        process.send_signal(signal.SIGTERM)
+        process.wait(30)
+    logs = asyncio.run(_log(directory))
+    for stream, count in acknowledged.items():
+        seqs = [entry.seq for entry in logs[stream[0]] if entry.robot == stream[1]]
+        # In order and without a hole; one may have been stored as its answer was lost.
+        assert seqs == list(range(len(seqs)))
+        assert len(seqs) - count in (0, 1)
+    for site, entries in logs.items():
+        view = _undisturbed(mapper, entries)
+        shown = [(ln["id"], ln["x1"], ln["y1"], ln["x2"], ln["y2"]) for ln in maps["lines"][site]]
+        assert shown == [(ln.id, ln.x1, ln.y1, ln.x2, ln.y2) for ln in view.lines]
+        for robot, trajectory in view.trajectories.items():
+            poses = maps["poses"][f"{site}/{robot}"]
+            assert [[p["x"], p["y"], p["theta"]] for p in poses] == trajectory.poses.tolist()
+    return kills
+
+
+def test_kills_at_random_points_lose_nothing_and_leave_the_same_map(tmp_path: Path) -> None:
+    importlib.import_module("fake_mapper")  # this process feeds it as well
+    assert _run(tmp_path, FAKE, seed=3, lives=2, scan=_plain_scan) >= 2
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [1, 2])
+def test_dozens_of_kills_lose_nothing_and_leave_the_same_map(tmp_path: Path, seed: int) -> None:
+    assert _run(tmp_path, FAKE, seed, lives=20, scan=_plain_scan) >= 30
+
+
+@pytest.mark.long
+def test_the_real_map_is_bit_identical_after_dozens_of_kills(tmp_path: Path) -> None:
+    assert _run(tmp_path, SITE_MAPPER, seed=5, lives=15, scan=_driven()) >= 20
+
+
+def _driven() -> Scans:
+    """What a robot sees on a tour of an office floor, over and over."""
+    fleet = Fleet.office(1, seed=4)
+    recorded = [record_to_json(ScanRecord(seen.scan)) for seen in islice(fleet.scans(), 800)]
+
+    def scan(seq: int) -> dict[str, Any]:
+        body = {**recorded[seq % len(recorded)], "seq": seq, "stamp": 0.2 * seq}
+        return {name: value for name, value in body.items() if name not in _NOT_POSTED}
+
+    return scan
