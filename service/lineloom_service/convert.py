@@ -176,7 +176,11 @@ def to_graph(site: str, view: SiteView) -> wire.Graph:
         for c in view.constraints
         if c.state == "accepted"
     ]
-    summary = wire.GraphSummary(site=site, version=view.version)
+    submaps = [
+        wire.Submap(id=s.id, robot=s.robot, anchor=s.anchor, keyframes=list(s.keyframes))
+        for s in view.submaps
+    ]
+    summary = wire.GraphSummary(site=site, version=view.version, submaps=submaps)
     return wire.Graph(graph=summary, nodes=nodes, edges=edges)
 
 

@@ -206,7 +206,7 @@ async def test_graph(client: httpx.AsyncClient) -> None:
     graph = nx.node_link_graph(answer, edges="edges")
     assert (graph.number_of_nodes(), graph.number_of_edges()) == (3, 1)
     assert graph.nodes[0]["robot"] == "a"
-    assert graph.graph == {"site": "office", "version": 9}
+    assert graph.graph == {"site": "office", "version": 9, "submaps": []}
     assert list(graph.edges(keys=True)) == [(0, 2, "k0-2")]
     g2o = await _get(client, "/graph", format="g2o")
     assert g2o.text.count("VERTEX_SE2") == 3

@@ -142,7 +142,7 @@ class FakeServer:
                 {"component": "c0", **place, "score": 0.9},
                 {"component": "c1", **place, "score": 0.2},
             ]
-            return {"verdict": "unique", "hypotheses": hypotheses}
+            return {"verdict": "unique", "reason": "", "scan": 0, "hypotheses": hypotheses}
 
         return router
 

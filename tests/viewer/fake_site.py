@@ -92,7 +92,12 @@ class FakeSite:
             *range(STEPS, 2 * STEPS - 1),
         ]
         edges = [{"source": i, "target": i + 1, "key": f"s{i}", "kind": "sequential"} for i in ways]
-        return {"graph": {"site": SITE, "version": self.version}, "nodes": nodes, "edges": edges}
+        submaps = [
+            {"id": 0, "robot": "ada", "anchor": 2, "keyframes": [0, 1, 2, 3, 4]},
+            {"id": 1, "robot": "bob", "anchor": 14, "keyframes": [12, 13, 14, 15]},
+        ]
+        summary = {"site": SITE, "version": self.version, "submaps": submaps}
+        return {"graph": summary, "nodes": nodes, "edges": edges}
 
     def trajectory(self, robot: str) -> dict[str, Any]:
         """`GET …/robots/{robot}/trajectory`."""

@@ -209,3 +209,15 @@ def test_panning_zooming_fitting_and_a_reload(fake: FakeServer, page: Page) -> N
     expect(page.get_by_label("Keyframes")).to_be_checked()
     page.get_by_role("button", name="Show all (F)").click()
     assert camera(page)["scale"] == pytest.approx(fitted["scale"])
+
+
+@pytest.mark.parametrize("layer", ["Keyframes", "Submaps", "Rejected"])
+def test_a_layer_is_drawn_when_it_is_switched_on(fake: FakeServer, page: Page, layer: str) -> None:
+    open_viewer(page, fake.url, SITE)
+    without = page.locator("#map").screenshot()
+    page.get_by_label(layer).check()
+    page.wait_for_function("() => !lineloom.view._picture._job && !lineloom.view._frame")
+    assert page.locator("#map").screenshot() != without
+    page.get_by_label(layer).uncheck()
+    page.wait_for_function("() => !lineloom.view._picture._job && !lineloom.view._frame")
+    assert page.locator("#map").screenshot() == without

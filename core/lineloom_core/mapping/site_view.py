@@ -94,6 +94,19 @@ class KeyframeView:
 
 
 @dataclass(frozen=True, slots=True)
+class SubmapView:
+    """The last metres of a robot's way at one time, as places are recognised by them.
+
+    anchor: the keyframe whose frame is the submap's. keyframes: all of them, in driving order.
+    """
+
+    id: int
+    robot: str
+    anchor: int
+    keyframes: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class StateChange:
     """When a constraint came into a state (`version`: log entries processed) and why."""
 
@@ -142,3 +155,4 @@ class SiteView:
     lines: tuple[MapLine, ...]
     keyframes: tuple[KeyframeView, ...]
     constraints: tuple[ConstraintView, ...]
+    submaps: tuple[SubmapView, ...] = ()

@@ -16,6 +16,7 @@ from lineloom_core.mapping.site_view import (
     KeyframeView,
     RobotView,
     SiteView,
+    SubmapView,
     TrajectoryView,
 )
 
@@ -32,6 +33,7 @@ def build_view(site: SiteMap, robots: dict[str, RobotRecord], version: int) -> S
         lines=fused_lines(site, component_of),
         keyframes=_keyframes(site, component_of),
         constraints=_constraints(site),
+        submaps=_submaps(site),
     )
 
 
@@ -117,6 +119,18 @@ def _keyframes(site: SiteMap, component_of: dict[int, str]) -> tuple[KeyframeVie
             pose=site.pose(k.id),
         )
         for k in site.keyframes.values()
+    )
+
+
+def _submaps(site: SiteMap) -> tuple[SubmapView, ...]:
+    return tuple(
+        SubmapView(
+            id=place.id,
+            robot=site.keyframes[place.anchor].robot,
+            anchor=place.anchor,
+            keyframes=place.keyframes,
+        )
+        for place in site.places.values()
     )
 
 

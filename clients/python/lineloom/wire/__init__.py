@@ -36,7 +36,7 @@ from lineloom.wire.export import (
     MapFrame,
 )
 from lineloom.wire.floorplan import FloorPlanAnswer, Placement, PlanDifferences, PlanPiece
-from lineloom.wire.graph import Graph, GraphEdge, GraphNode, GraphSummary
+from lineloom.wire.graph import Graph, GraphEdge, GraphNode, GraphSummary, Submap
 from lineloom.wire.ingest import IngestAnswer, RejectedScan, ScanBatch
 from lineloom.wire.localize import (
     MAX_RUN,
@@ -128,6 +128,7 @@ __all__ = [
     "Site",
     "SiteList",
     "StateChange",
+    "Submap",
     "Trajectory",
     "TrajectoryPose",
     "Transform",

@@ -2,7 +2,21 @@
 
 from __future__ import annotations
 
+from pydantic import Field
+
 from lineloom.wire.base import Answer, Covariance
+
+
+class Submap(Answer):
+    """The last metres of a robot's way at one time: what places are recognised by.
+
+    anchor: the keyframe whose frame is the submap's. keyframes: in driving order.
+    """
+
+    id: int
+    robot: str
+    anchor: int
+    keyframes: list[int]
 
 
 class GraphSummary(Answer):
@@ -10,6 +24,7 @@ class GraphSummary(Answer):
 
     site: str
     version: int
+    submaps: list[Submap] = Field(default_factory=list)
 
 
 class GraphNode(Answer):

@@ -52,7 +52,7 @@
  * @typedef {Pose & {component: string, covariance: (number|null)[][]|null, score: number,
  *   checks: Object<string, number|null>}} HypothesisAnswer
  * @typedef {{verdict: "unique"|"ambiguous"|"unknown", hypotheses: HypothesisAnswer[],
- *   reason?: string}} LocalizeAnswer
+ *   reason: string, scan: number|null}} LocalizeAnswer
  *
  * @typedef {{seq: number, stamp: number, component: string, x: number, y: number,
  *   theta: number}} TrajectoryPose

@@ -25,7 +25,8 @@ export class Localizer {
     const { body, scans } = readScanFile(await file.text());
     this.answer = await this._api.post(`v1/sites/${encodeURIComponent(site)}/localize`, body);
     this.name = file.name;
-    this._points = scanPoints(scans[scans.length - 1]);
+    // Of several scans, the answer names the one that its poses are of.
+    this._points = scanPoints(scans[this.answer?.scan ?? scans.length - 1]);
   }
 
   /** @param {CanvasRenderingContext2D} context @param {import("../draw/camera.js").Camera} camera @param {import("../draw/painter.js").Scene} scene */

@@ -40,7 +40,8 @@ export function localizeCard(localizer, { onClose }, onChoose) {
     `Where is ${localizer.name}?`,
     tag(answer.verdict),
     onClose,
-    h("p", { className: "reason" }, answer.reason || MEANING[answer.verdict]),
+    h("p", { className: "reason" }, MEANING[answer.verdict]),
+    answer.reason && h("p", { className: "muted" }, answer.reason),
     rows.length > 0 && h("ul", { className: "rows" }, ...rows),
     chosen &&
       facts([

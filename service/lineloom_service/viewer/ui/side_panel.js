@@ -11,6 +11,10 @@ const EXPORTS = [
   ["SVG", "svg", "map.svg"],
   ["PNG", "png", "map.png"],
   ["GeoJSON", "geojson", "map.geojson"],
+  ["DXF", "dxf", "map.dxf"],
+  ["nav2", "nav2", "map.zip"],
+  ["CSV", "csv", "map.csv"],
+  ["IEEE 1873", "ieee1873", "map.xml"],
 ];
 
 /**
