@@ -52,6 +52,9 @@ class Settings(BaseSettings):
         default=20_000, ge=1, description="Log entries of a site waiting to be mapped before 429."
     )
 
+    robot_backlog_limit: int = Field(
+        default=10_000, ge=1, description="Of these, those that one robot may have."
+    )
     group_limit: int = Field(
         default=256, ge=1, description="Requests that may share a commit to the disk."
     )

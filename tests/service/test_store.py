@@ -213,6 +213,26 @@ async def test_a_full_backlog_takes_nothing(store: SqlStore) -> None:
     assert taken.accepted == 10
 
 
+async def test_a_flooding_robot_is_stopped_while_the_others_are_taken(store: SqlStore) -> None:
+    async def send(robot: str, seqs: Sequence[int], processed: int = 0) -> int:
+        answer = await store.append_scans(
+            "site", robot, _scans(seqs), processed=processed, limit=30, robot_limit=10
+        )
+        return answer.accepted
+
+    assert await send("flood", range(10)) == 10
+    with pytest.raises(BacklogFullError, match="of robot 'flood'") as refusal:
+        await send("flood", range(10, 15))
+    assert (refusal.value.robot, refusal.value.pending) == ("flood", 10)
+    assert await send("calm", range(8)) == 8
+    results = await asyncio.gather(
+        *(send("flood", [seq], processed=5) for seq in range(10, 20)), return_exceptions=True
+    )
+    assert [r for r in results if r == 1] == [1] * 5  # 1..5 are mapped: so much room is free
+    assert all(isinstance(r, BacklogFullError) for r in results[5:])
+    assert await send("calm", [8, 9], processed=5) == 2
+
+
 async def test_a_site_that_has_caught_up_takes_any_batch(store: SqlStore) -> None:
     answer = await store.append_scans("site", "r", _scans(range(10)), processed=0, limit=5)
     assert answer.accepted == 10

@@ -115,6 +115,12 @@ class Conductor:
             await asyncio.sleep(_LOOK_AGAIN_S)
         return True
 
+    def processed(self, site_id: int) -> int:
+        """Return the position that the mapper is known to be through: often beyond the view's."""
+        runner = self._runners.get(site_id)
+        done = 0 if runner is None else runner.done
+        return max(done, self.published(site_id).position)
+
     def skips(self, site_id: int) -> list[Skip]:
         """Return the entries of a site that are not in its map for good."""
         return list(self.published(site_id).skips)

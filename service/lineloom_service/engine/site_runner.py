@@ -76,6 +76,11 @@ class SiteRunner:
         self._marks: dict[int, int] = {}
         self._under_way: deque[tuple[asyncio.Future[object], int, int]] = deque()
 
+    @property
+    def done(self) -> int:
+        """The position that the mapper is through."""
+        return self._done
+
     def on_commit(self, record: SiteRecord) -> None:
         """There may be more to feed."""
         self._end = record.position

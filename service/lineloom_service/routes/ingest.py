@@ -28,9 +28,13 @@ async def post_scans(
     body = await read_body(request, settings.max_body_bytes)
     intake = await take_in(body, settings.max_batch)
     known = await service.store.site(site)
-    processed = 0 if known is None else service.conductor.published(known.id).position
     appended = await service.store.append_scans(
-        site, robot, intake.scans, processed=processed, limit=settings.backlog_limit
+        site,
+        robot,
+        intake.scans,
+        processed=0 if known is None else service.conductor.processed(known.id),
+        limit=settings.backlog_limit,
+        robot_limit=settings.robot_backlog_limit,
     )
     await service.pacer.turn()  # all that shared the commit come back at once
     service.metrics.count_scans(site, appended.accepted, appended.duplicates)

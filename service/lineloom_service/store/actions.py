@@ -41,10 +41,14 @@ def append_scans(
     *,
     processed: int,
     limit: int,
+    robot_limit: int,
     now: float,
 ) -> Appended:
     """Store the scans that are new, in the order of seq, and release what need not wait."""
-    _check_backlog(tx.ledger.sites.get(site_name), len(scans), processed, limit)
+    known_site = tx.ledger.sites.get(site_name)
+    if known_site is not None:
+        _check_backlog(known_site, len(scans), processed, limit)
+        _check_robot(tx, known_site, robot_name, len(scans), processed, robot_limit)
     site = tx.site(site_name)
     robot = tx.robot(site, robot_name)
     by_session: dict[str, dict[int, NewScan]] = {}
@@ -61,13 +65,23 @@ def append_scans(
     return Appended(accepted, len(scans) - accepted, site.id, site.position, site.held)
 
 
-def _check_backlog(site: SiteLedger | None, coming: int, processed: int, limit: int) -> None:
-    if site is None:
-        return
+def _check_backlog(site: SiteLedger, coming: int, processed: int, limit: int) -> None:
     pending = site.position - processed + site.held
     # A site that has caught up takes any batch: a limit below a batch's size is no deadlock.
     if pending > 0 and pending + coming > limit:
         raise BacklogFullError(pending, limit)
+
+
+def _check_robot(
+    tx: Transaction, site: SiteLedger, name: str, coming: int, processed: int, limit: int
+) -> None:
+    """Leave room for the site's other robots, however fast this one sends."""
+    robot = site.robots.get(name)
+    if robot is None or site.position - processed + site.held + coming <= limit:
+        return
+    pending = tx.released_after(site, robot, processed) + robot.order.held
+    if pending > 0 and pending + coming > limit:
+        raise BacklogFullError(pending, limit, robot=name)
 
 
 def set_mount(tx: Transaction, site_name: str, robot_name: str, mount: bytes | None) -> None:

@@ -64,11 +64,19 @@ class Store(Protocol):
         ...
 
     async def append_scans(
-        self, site: str, robot: str, scans: Sequence[NewScan], *, processed: int, limit: int
+        self,
+        site: str,
+        robot: str,
+        scans: Sequence[NewScan],
+        *,
+        processed: int,
+        limit: int,
+        robot_limit: int | None = None,
     ) -> Appended:
         """Store scans of one robot, creating site and robot on first use.
 
-        Raises BacklogFullError, taking nothing, where more than `limit` entries wait already;
+        Raises BacklogFullError, taking nothing, where more than `limit` entries wait already, or
+        more than `robot_limit` of this robot's (as many as `limit` if None);
         `processed`: how many of the site's released entries the mapper is known to be through.
         """
         ...

@@ -120,12 +120,17 @@ class EventBatch:
 
 
 class BacklogFullError(Exception):
-    """The site's mapper is too far behind; nothing of the POST was taken."""
+    """The site's mapper is too far behind; nothing of the POST was taken.
 
-    def __init__(self, pending: int, limit: int) -> None:
-        super().__init__(f"{pending} entries wait to be mapped, the limit is {limit}")
+    robot: whose share of the backlog is full, None where it is the site's whole.
+    """
+
+    def __init__(self, pending: int, limit: int, robot: str | None = None) -> None:
+        whose = "" if robot is None else f" of robot {robot!r}"
+        super().__init__(f"{pending} entries{whose} wait to be mapped, the limit is {limit}")
         self.pending = pending
         self.limit = limit
+        self.robot = robot
 
 
 class StoreError(Exception):

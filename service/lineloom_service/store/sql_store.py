@@ -86,14 +86,28 @@ class SqlStore:
         self._news_listeners.append(listener)
 
     async def append_scans(
-        self, site: str, robot: str, scans: Sequence[NewScan], *, processed: int, limit: int
+        self,
+        site: str,
+        robot: str,
+        scans: Sequence[NewScan],
+        *,
+        processed: int,
+        limit: int,
+        robot_limit: int | None = None,
     ) -> Appended:
         """Store scans; see the protocol."""
 
         def action(tx: Transaction) -> Appended:
             now = time.monotonic()
             return actions.append_scans(
-                tx, site, robot, scans, processed=processed, limit=limit, now=now
+                tx,
+                site,
+                robot,
+                scans,
+                processed=processed,
+                limit=limit,
+                robot_limit=limit if robot_limit is None else robot_limit,
+                now=now,
             )
 
         return await self._write(action)

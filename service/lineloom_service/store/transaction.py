@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from sqlalchemy import Connection, bindparam, insert, select, update
+from sqlalchemy import Connection, bindparam, func, insert, select, update
 
 from lineloom_service.store import tables
 from lineloom_service.store.ledger import Ledger, RobotLedger, SiteLedger
@@ -47,6 +47,7 @@ class Transaction:
         self.touched: dict[int, SiteLedger] = {}
         self.gone: list[SiteLedger] = []
         self._counted_on = False
+        self._released: dict[int, int] = {}
         self._new: dict[int, dict[str, Any]] = {}
         self._placed: list[dict[str, int]] = []
         self._streams: dict[int, Stream] = {}
@@ -107,6 +108,8 @@ class Transaction:
         entries = robot.order.flush() if now is None else robot.order.release(now)
         if entries:
             site.held -= len(entries)
+            if robot.id in self._released:
+                self._released[robot.id] += len(entries)
             site.changed.add(robot.name)
             self._place(site, entries)
             self._streams.update((stream.id, stream) for stream in waiting)
@@ -138,6 +141,17 @@ class Transaction:
         self.connection.execute(
             update(tables.sites).where(tables.sites.c.id == site.id).values(deleted=True)
         )
+
+    def released_after(self, site: SiteLedger, robot: RobotLedger, position: int) -> int:
+        """Count a robot's entries behind a position, once a commit: its own are added here."""
+        if robot.id not in self._released:
+            self.flush()
+            c = tables.entries.c
+            query = select(func.count()).where(
+                c.site_id == site.id, c.position > position, c.robot_id == robot.id
+            )
+            self._released[robot.id] = self.connection.execute(query).scalar_one()
+        return self._released[robot.id]
 
     def flush(self) -> None:
         """Send what was gathered to the database."""
