@@ -48,8 +48,10 @@ class JoinConfig:
     each, so that it is known what else looks alike. least_evidence: metres of wall in the set.
     lead: how many times the evidence of the best rival set. least_distinctive: constraints of the
     set whose evidence must be `distinctive` times that of any known mistake about their places.
-    most_conflict: share of points in free space, beyond the places' own, over all places that
-    would overlap and that drift has moved by less than `rigid_within` [m] against the set.
+    most_missing: share of what stood still for one robot and was not there for the other, over
+    the places of the set; most_map_missing: over all places that would overlap and that drift has
+    moved by less than `rigid_within` [m] against the set. most_doubt: the share of the set if
+    `doubted_points` more were missing: three pieces of furniture, each in a few pairs of places.
     loop_gate: sigmas of drift within which a loop is believed.
     """
 
@@ -59,7 +61,10 @@ class JoinConfig:
     lead: float = 2.0
     least_distinctive: int = 2
     distinctive: float = 1.3
-    most_conflict: float = 0.08
+    most_missing: float = 0.025
+    most_map_missing: float = 0.03
+    most_doubt: float = 0.045
+    doubted_points: float = 180.0
     rigid_within: float = 0.1
     loop_gate: float = 3.0
     most_candidates: int = 64

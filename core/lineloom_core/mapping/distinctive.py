@@ -30,7 +30,7 @@ def _looks_like(site: SiteMap, place: Place, other: Place, need: float) -> bool:
     """Whether there is more evidence than `need` for another relative pose than the known one."""
     first, second = (other, place) if other.id < place.id else (place, other)
     known = site.pose(first.anchor).between(site.pose(second.anchor))
-    table = site.memory.hypotheses(first, second)
+    table = site.memory.look_alikes(first, second)
     for drift in (site.rough_drift, site.drift):  # the second takes long and is seldom asked
         slack = reach(drift(first.anchor, second.anchor)) if first is not second else 0.0
         evidence = evidence_elsewhere(table, known, site.config.recognition, slack=slack)

@@ -18,10 +18,9 @@ from lineloom_core.graph import consistent_sets, optimize, pairwise_consistent, 
 from lineloom_core.mapping.changes import ComponentMerged
 from lineloom_core.mapping.constraint import CONSTRAINT_FLOOR, Constraint, turned_round
 from lineloom_core.mapping.distinctive import is_distinctive
+from lineloom_core.mapping.overlap import Overlap, overlap_of_sets
 from lineloom_core.mapping.refusals import refuse_barred
 from lineloom_core.mapping.site_map import SiteMap
-from lineloom_core.mapping.usual_conflict import conflict_between, usual_conflict
-from lineloom_core.places import Place
 
 
 def join(site: SiteMap, root: int, keyframe: int) -> ComponentMerged | None:
@@ -35,14 +34,12 @@ def join(site: SiteMap, root: int, keyframe: int) -> ComponentMerged | None:
         _wait(site, candidates, objection)
         return None
     T_A_B, together = _solved_together(site, a_root, b_root, chosen)
-    near_a = _places_near(site, [c.keyframe_a for c in chosen])
-    near_b = _places_near(site, [c.keyframe_b for c in chosen])
-    share = _conflict_share(site, near_a, near_b, together)
-    usual = 0.5 * (usual_conflict(site, near_a) + usual_conflict(site, near_b))
-    if share > site.config.join.most_conflict + usual:
-        _wait(site, chosen, f"the maps contradict each other there ({100 * share:.0f} %)")
+    overlap = overlap_of_sets(site, chosen, together)
+    objection = overlap.objection(site.config.join)
+    if objection:
+        _wait(site, chosen, objection)
         return None
-    merged = _accept(site, chosen, b_root, T_A_B, _figures(site, chosen, rival, share))
+    merged = _accept(site, chosen, b_root, T_A_B, _figures(site, chosen, rival, overlap))
     _drop_others(site, candidates, chosen)
     site.optimise(a_root)
     return merged
@@ -67,7 +64,7 @@ def _accept(
 
 
 def _figures(
-    site: SiteMap, chosen: list[Constraint], rival: list[Constraint], map_conflict: float
+    site: SiteMap, chosen: list[Constraint], rival: list[Constraint], overlap: Overlap
 ) -> dict[str, float]:
     """What the set was held to, for every one of its constraints to show."""
     return {
@@ -75,7 +72,9 @@ def _figures(
         "set_evidence": sum(c.evidence for c in chosen),
         "rival_evidence": float(sum(c.evidence for c in rival)),
         "set_distinctive": float(sum(is_distinctive(site, c) for c in chosen)),
-        "map_conflict": map_conflict,
+        "set_missing": overlap.set_missing,
+        "set_doubt": overlap.set_doubt,
+        "map_missing": overlap.map_missing,
     }
 
 
@@ -154,40 +153,6 @@ def _solved_together(
     nodes = {**nodes_a, **{n: T_A_B @ pose for n, pose in nodes_b.items()}}
     solution = optimize(nodes, [*edges_a, *edges_b, *between], anchors=(a_root,))
     return T_A_B, solution.poses
-
-
-def _conflict_share(
-    site: SiteMap, near_a: list[Place], near_b: list[Place], poses: dict[int, Pose]
-) -> float:
-    """Free-space conflict, beyond the places' own, over all that would overlap near the set."""
-    pairs = [
-        (a, b, poses[a.anchor].between(poses[b.anchor]))
-        for a in near_a
-        for b in near_b
-        if poses[a.anchor].distance(poses[b.anchor]) <= site.config.places.span
-    ]
-    return conflict_between(pairs)
-
-
-def _places_near(site: SiteMap, keyframes: list[int]) -> list[Place]:
-    """Places of the component that lie firmly against the nearest of the keyframes.
-
-    As far, that is, as drift lets the two maps be compared at all.
-    """
-    most = site.config.join.rigid_within**2
-    return [
-        place
-        for place in site.places.values()
-        if site.same_component(place.anchor, keyframes[0])
-        and min(_looseness(site, k, place.anchor) for k in keyframes) <= most
-    ]
-
-
-def _looseness(site: SiteMap, matched: int, place: int) -> float:
-    """Variance of a place's position [m^2] where a keyframe of its component is matched."""
-    lever = site.pose(matched).distance(site.pose(place))
-    drift = site.drift(matched, place)
-    return float(0.5 * (drift[0, 0] + drift[1, 1]) + CONSTRAINT_FLOOR[2, 2] * lever**2)
 
 
 def _drop_others(site: SiteMap, candidates: list[Constraint], chosen: list[Constraint]) -> None:

@@ -5,6 +5,7 @@ from lineloom_core.places.place import (
     Place,
     conflicting_points,
     count_points,
+    count_steady,
     share_explained,
 )
 from lineloom_core.places.recognition import (
@@ -15,6 +16,7 @@ from lineloom_core.places.recognition import (
     evidence_elsewhere,
     evidence_of,
     hypotheses,
+    missing_share,
     recognise,
     rivals,
 )
@@ -28,9 +30,11 @@ __all__ = [
     "check_alignment",
     "conflicting_points",
     "count_points",
+    "count_steady",
     "evidence_elsewhere",
     "evidence_of",
     "hypotheses",
+    "missing_share",
     "recognise",
     "rivals",
     "share_explained",

@@ -12,6 +12,7 @@ from lineloom_core.matching._free_space_kernels import (
     MATCHED,
     invert_pose,
     judge_cloud,
+    judge_point,
 )
 from lineloom_core.matching._proposal_kernels import propose, wrap_angle
 from lineloom_core.matching._refinement_kernels import refine
@@ -45,6 +46,35 @@ def judge_places(  # type: ignore[no-untyped-def]
     judge_cloud(
         ref_points, step, back, cur_ranges, cur_mins, cur_incs, cur_poses, base, slope, counts
     )
+
+
+@njit(cache=True)
+def tally_sweeps(  # type: ignore[no-untyped-def]
+    points, pose, ranges, angle_mins, angle_increments, poses, base, slope, out
+):
+    """How many sweeps measured each point (out[:, 0]) and how many saw through it (out[:, 1]).
+
+    points (n, 2) in frame A, moved by `pose` into the frame of the sweeps.
+    """
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    cs, ss = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    per_radian = 1.0 / angle_increments
+    turns = 2.0 * math.pi * per_radian
+    for k in range(points.shape[0]):
+        x = c * points[k, 0] - s * points[k, 1] + pose[0]
+        y = s * points[k, 0] + c * points[k, 1] + pose[1]
+        hits = misses = 0
+        for q in range(ranges.shape[0]):
+            dx, dy = x - poses[q, 0], y - poses[q, 1]
+            verdict = judge_point(
+                cs[q] * dx + ss[q] * dy, cs[q] * dy - ss[q] * dx, ranges[q],
+                angle_mins[q], per_radian[q], turns[q], base, slope,
+            )  # fmt: skip
+            if verdict == MATCHED:
+                hits += 1
+            elif verdict == CONFLICT:
+                misses += 1
+        out[k, 0], out[k, 1] = hits, misses
 
 
 @njit(cache=True)

@@ -69,6 +69,17 @@ class Place:
         matched, conflict = count_points(self, self, Pose.identity())
         return conflict / max(matched + conflict, 1.0)
 
+    @cached_property
+    def steady(self) -> NDArray[np.bool_]:
+        """Which surface points stood still, shape (n,): seen twice, and hardly ever seen through.
+
+        People walk and doors move while a robot passes; walls, furniture and columns do not.
+        """
+        tally = _tally(self, self.surface.points, Pose.identity())
+        hits, misses = tally[:, 0], tally[:, 1]
+        still: NDArray[np.bool_] = (hits >= 2) & (misses <= 0.25 * hits)
+        return still
+
     @staticmethod
     def of(id: int, track: int, anchor: int, glimpses: Sequence[Glimpse]) -> Place:
         """Fuse the glimpses of consecutive keyframes of one track."""
@@ -122,6 +133,31 @@ def share_explained(reference: Place, current: Place, T_reference_current: Pose)
         TOLERANCE, TOLERANCE_SLOPE, counts,
     )  # fmt: skip
     return float(counts[0]) / max(len(current.surface.points), 1)
+
+
+def count_steady(reference: Place, current: Place, T_reference_current: Pose) -> tuple[int, int]:
+    """Steady points of either place that the other saw as well, and those it saw through.
+
+    Seen through means by two sweeps at least, and by three times as many as measured it: what
+    stood still for one robot and was not there for the other. Two views of one room differ by a
+    door or a chair; two rooms that look alike differ by all that stands in them.
+    """
+    there = _tally(reference, current.surface.points, T_reference_current)[current.steady]
+    here = _tally(current, reference.surface.points, T_reference_current.inverse())
+    tally = np.concatenate([there, here[reference.steady]])
+    hits, misses = tally[:, 0], tally[:, 1]
+    matched = np.count_nonzero((hits > 0) & (hits >= misses))
+    return int(matched), int(np.count_nonzero((misses >= 2) & (misses >= 3 * hits)))
+
+
+def _tally(place: Place, points: NDArray[np.float64], T_place_points: Pose) -> NDArray[np.float64]:
+    """Sweeps of the place that measured each point and that saw through it, shape (n, 2)."""
+    out = np.empty((len(points), 2))
+    _kernels.tally_sweeps(
+        points, T_place_points.to_array(), place.ranges, place.angle_mins, place.angle_increments,
+        place.sweep_poses, TOLERANCE, TOLERANCE_SLOPE, out,
+    )  # fmt: skip
+    return out
 
 
 def conflicting_points(

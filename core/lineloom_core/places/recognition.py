@@ -17,7 +17,7 @@ from lineloom_core.graph.observability import observe
 from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
 from lineloom_core.matching.local_map import Registration
 from lineloom_core.places import _kernels
-from lineloom_core.places.place import Place, count_points
+from lineloom_core.places.place import Place, count_points, count_steady
 from lineloom_core.timing import timed
 
 
@@ -27,7 +27,8 @@ class RecognitionConfig:
 
     half, cell: how far apart anchors may lie, and the cell of the translation vote.
     most_conflict: share of judged points in the other's free space, beyond
-    what the places show against themselves. least_matched: points (cells
+    what the places show against themselves. most_missing: share of what stood still in one place
+    that the other saw through. least_matched: points (cells
     of 0.1 m) that both saw. least_overlap: common length of lines. least_fit: share of the
     points inside both grids that lie on the other's surface. least_margin: by how much evidence
     the best hypothesis beats the best rival, as a share. least_information: smallest eigenvalue
@@ -43,6 +44,7 @@ class RecognitionConfig:
     coarse_keep: int = 16
     fine_keep: int = 4
     most_conflict: float = 0.1
+    most_missing: float = 0.05
     least_matched: float = 100.0
     least_overlap: float = 5.0
     least_margin: float = 0.15
@@ -93,6 +95,10 @@ def recognise(
     checks["margin"] = 1.0 - rival / evidence if evidence > 0.0 else 0.0
     checks["own_conflict"] = reference.own_conflict + current.own_conflict
     reason = _objection(checks, config)
+    if not reason:
+        checks["missing_share"] = missing_share(*count_steady(reference, current, registered.pose))
+        if checks["missing_share"] > config.most_missing:
+            reason = "what stood still in one place is missing in the other"
     return Recognition(
         plausible=reason == "",
         T_reference_current=registered.pose,
@@ -153,6 +159,11 @@ def check_alignment(reference: Place, current: Place, registered: Registration) 
         "information": seen.lambda_min,
         "isotropy": seen.lambda_min / max(seen.lambda_max, 1e-9),
     }
+
+
+def missing_share(matched: float, missing: float) -> float:
+    """Share of the steady points that the other place should have seen and did not, 0..1."""
+    return missing / max(matched + missing, 1.0)
 
 
 def evidence_of(row: NDArray[np.float64]) -> float:

@@ -37,6 +37,19 @@ def judge_places(
     return there + back
 
 
+def tally(
+    place: Place, points: Floats, T_place_points: Pose, tolerance: tuple[float, float]
+) -> Floats:
+    """Sweep by sweep, point by point: who measured it, who saw through it."""
+    rows = np.zeros((len(points), 2))
+    for i, point in enumerate(points):
+        for sweep in sweeps_of(place):
+            counts = pairwise.judge_cloud(point[None, :], T_place_points, [sweep], *tolerance)
+            rows[i, 0] += counts[_free_space_kernels.MATCHED]
+            rows[i, 1] += counts[_free_space_kernels.CONFLICT]
+    return rows
+
+
 def evidence(row: Floats) -> float:
     """Metres of common line and cells of 0.1 m that both saw, less thrice what contradicts."""
     return float(row[9] + 0.1 * row[5] - 0.3 * row[6])

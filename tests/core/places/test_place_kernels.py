@@ -11,7 +11,7 @@ from lineloom_core.matching import _free_space_kernels, _proposal_kernels
 from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
 from lineloom_core.places import Place
 from lineloom_core.places import _kernels as fast
-from lineloom_core.places.place import count_points
+from lineloom_core.places.place import count_points, count_steady
 
 from tests.core.places import slow_twins as slow
 from tests.core.places.conftest import Stretch
@@ -20,6 +20,7 @@ ARGS = (TOLERANCE, TOLERANCE_SLOPE)
 # Compiled functions carry no types.
 judge_places: Any = fast.judge_places
 match_places: Any = fast.match_places
+tally_sweeps: Any = fast.tally_sweeps
 propose: Any = _proposal_kernels.propose
 PROPOSING = (8, 12, 0.25, 80, 0.25, 16.0, 0.3)
 
@@ -87,3 +88,33 @@ def test_evidence_counts_lines_and_cells_and_punishes_conflict() -> None:
     assert fast.place_evidence(120.0, 10.0, 7.5) == pytest.approx(7.5 + 12.0 - 3.0)
     row = np.array([0, 0, 0, 0, 0, 120.0, 10.0, 0, 0, 7.5])
     assert slow.evidence(row) == pytest.approx(fast.place_evidence(120.0, 10.0, 7.5))
+
+
+@pytest.mark.parametrize("off", [Pose.identity(), Pose(0.6, -0.4, 0.5)])
+def test_tally_of_sweeps(half_turn_stretches: list[Stretch], off: Pose) -> None:
+    s = half_turn_stretches[0]
+    T = s.forth.T_world_anchor.between(s.back.T_world_anchor) @ off
+    ref, points = s.forth.place, s.back.place.surface.points[::5]
+    out = np.empty((len(points), 2))
+    tally_sweeps(
+        points, T.to_array(), ref.ranges, ref.angle_mins, ref.angle_increments, ref.sweep_poses,
+        *ARGS, out,
+    )  # fmt: skip
+    expected = slow.tally(ref, points, T, ARGS)
+    # A point at the border of two beams may fall to either.
+    assert np.mean(np.any(out != expected, axis=1)) < 0.03
+    assert np.count_nonzero(expected) > 10
+
+
+def test_what_stands_still_is_steady_and_found_again(half_turn_stretches: list[Stretch]) -> None:
+    s = half_turn_stretches[0]
+    T = s.forth.T_world_anchor.between(s.back.T_world_anchor)
+    ref, cur = s.forth.place, s.back.place
+    assert ref.steady.mean() > 0.7
+    matched, missing = count_steady(ref, cur, T)
+    assert matched > 100
+    assert missing <= 0.02 * matched
+    assert count_steady(cur, ref, T.inverse()) == (matched, missing)
+    moved, gone = count_steady(ref, cur, T @ Pose(0.6, -0.4, 0.5))
+    assert gone > 5 * max(missing, 1)
+    assert moved < matched
