@@ -106,7 +106,10 @@ export class MapView {
   /** Return a camera that shows all. */
   _fitted() {
     const camera = this.camera.copy();
-    if (this.state) camera.fit(pageBounds(this.state.components, this.placement), this.insets);
+    if (!this.state) return camera;
+    const bounds = pageBounds(this.state.components, this.placement);
+    // The frames of several components stand out a little.
+    camera.fit(bounds.grown(this.state.components.length > 1 ? 0.9 : 0), this.insets);
     return camera;
   }
 

@@ -8,11 +8,17 @@ export class Localizer {
   /** @param {import("../net/api.js").Api} api */
   constructor(api) {
     this._api = api;
-    this.clear();
+    /** @type {import("../net/contract.js").LocalizeAnswer|null} */
+    this.answer = null;
+    /** Name of the file that was asked for. */
+    this.name = "";
+    /** Rank of the hypothesis that is shown. */
+    this.chosen = 0;
+    this._points = new Float32Array();
   }
 
+  /** Show no answer any more. */
   clear() {
-    /** @type {import("../net/contract.js").LocalizeAnswer|null} */
     this.answer = null;
     this.name = "";
     this.chosen = 0;
