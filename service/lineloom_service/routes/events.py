@@ -14,6 +14,7 @@ from lineloom_service.events.feed import EventFeed, Message
 from lineloom_service.events.stream import EventStream
 from lineloom_service.openapi import events_of
 from lineloom_service.service import Service
+from lineloom_service.store.records import SiteRecord
 
 router = APIRouter(tags=["events"])
 
@@ -46,12 +47,13 @@ async def get_events(
     feed = EventFeed(service.store, service.events, site.id, poll_s=None)
     first = await feed.start(last_event_id, view.version)
     following = feed.messages(settings.heartbeat_s, follow=follow)
-    messages = _counted(service, request.state.token_id, first, following)
+    messages = _counted(service, site, request.state.token_id, first, following)
     return EventStream(messages, settings.slow_reader_s)
 
 
 async def _counted(
     service: Service,
+    site: SiteRecord,
     token_id: str | None,
     first: Message,
     following: AsyncGenerator[Message | None],
@@ -64,7 +66,15 @@ async def _counted(
             async for message in following:
                 if not service.guard.still_good(token_id):
                     return
+                # Another process may have deleted it, or somebody made another of its name.
+                if message is None and not await _exists(service, site):
+                    return
                 yield message
     finally:
         service.events.listeners -= 1
         service.metrics.listeners.set(service.events.listeners)
+
+
+async def _exists(service: Service, site: SiteRecord) -> bool:
+    now = await service.store.site(site.name)
+    return now is not None and now.id == site.id

@@ -54,6 +54,10 @@ def serve(
         str | None,
         typer.Option(metavar="LEVEL", help="debug, info, warning or error; info."),
     ] = None,
+    log_format: Annotated[
+        str | None,
+        typer.Option(metavar="FORMAT", help="json, a line an object, or text, for people; json."),
+    ] = None,
 ) -> None:
     """Run the service: takes scans over HTTP, keeps them on disk, maps them.
 
@@ -84,6 +88,7 @@ def serve(
         "ssl_certfile": ssl_certfile,
         "ssl_keyfile": ssl_keyfile,
         "log_level": log_level,
+        "log_format": log_format,
     }
     try:
         settings = Settings(**{name: value for name, value in given.items() if value is not None})
