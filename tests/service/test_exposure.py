@@ -36,6 +36,7 @@ def _served(
     command = [sys.executable, "-m", "lineloom.cli", "serve", "--port", str(port)]
     command += ["--data-dir", str(directory), "--log-level", "debug", *options]
     environment = {k: v for k, v in os.environ.items() if not k.startswith("LINELOOM_")}
+    environment["LINELOOM_HEARTBEAT_S"] = "0.2"
     scheme = "http" if verify is True else "https"
     with (directory / "log").open("wb") as log:
         process = subprocess.Popen(command, stderr=log, stdout=log, env=environment)
@@ -52,6 +53,24 @@ def _served(
     finally:
         process.kill()
         process.wait()
+
+
+def test_a_revoked_token_ends_what_it_listens_to(tmp_path: Path) -> None:
+    scopes = ("--scope", "read", "--scope", "ingest")
+    token = _token("create", *scopes, "--data-dir", tmp_path)
+    scan = {"seq": 0, "stamp": 0.0, "angle_min": 0.0, "angle_increment": 0.1, "range_min": 0.1}
+    with _served(tmp_path, True) as client:
+        client.headers["Authorization"] = f"Bearer {token}"
+        url = "/v1/sites/s/robots/r/scans"
+        client.post(url, json={**scan, "range_max": 9.0, "ranges": [1.0]}).raise_for_status()
+        with client.stream("GET", "/v1/sites/s/events", timeout=10.0) as response:
+            lines = response.iter_lines()
+            assert next(lines).startswith("id: ")
+            assert any(line == ": ping" for line in lines)
+            _token("revoke", token.split("_")[1], "--data-dir", tmp_path)
+            for _ in lines:  # ends, or the test's client times out
+                pass
+        assert client.get("/v1/sites").status_code == 401
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "10.0.0.1", "lineloom.example"])
