@@ -200,8 +200,8 @@ def _draw(
     result: CaseResult, fleet: BenchFleet, overlap: Overlap, view: SiteView, folder: Path
 ) -> None:
     folder.mkdir(parents=True, exist_ok=True)
-    wanted = dict.fromkeys(result.false, "false")
-    wanted.update({missed.pair: "missed" for missed in result.missed})
+    wanted = {missed.pair: "missed" for missed in result.missed}
+    wanted.update(dict.fromkeys(result.false, "false"))
     for pair, what in sorted(wanted.items()):
         file = folder / f"{what}-{result.case.name}-{pair[0]}-{pair[1]}.png"
         file.write_bytes(draw_pair(fleet, overlap, view, pair, f"{what}: {result.case.name}"))

@@ -161,11 +161,15 @@ def _bulge(features: ScanFeatures, line: NDArray[np.float64]) -> tuple[float, fl
     if np.count_nonzero(flat) < _LEAST_POINTS:
         return None
     along, towards, bearing = along[flat], towards[flat], bearing[flat]
-    basis = np.column_stack([np.ones(len(along)), along - along.mean()])
-    both = np.column_stack([bearing * along, towards])
-    fitted, *_ = np.linalg.lstsq(basis, both, rcond=None)
-    shape, measured = (both - basis @ fitted).T
+    shape, measured = _detrended(bearing * along, along), _detrended(towards, along)
     return float(shape @ measured), float(shape @ shape)
+
+
+def _detrended(values: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What is left of values when a straight line over `along` is taken out."""
+    centred, at = values - values.mean(), along - along.mean()
+    left: NDArray[np.float64] = centred - (centred @ at) / (at @ at) * at
+    return left
 
 
 def _wrong_increment(epsilon: float, increment: float) -> Finding:
