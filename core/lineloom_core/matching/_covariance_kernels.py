@@ -28,6 +28,7 @@ from lineloom_core.matching._refinement_kernels import (
     directions,
     huber,
     line_residual,
+    lines_near,
     weights_of,
 )
 
@@ -153,52 +154,53 @@ def accumulate_noise(  # type: ignore[no-untyped-def]
     tx, ty = pose[0], pose[1]
     squares = used = 0.0
     along = directions(ref)
-    for j in range(cur.shape[0]):
-        for i in range(ref.shape[0]):
-            ux, uy = along[i, 0], along[i, 1]
-            shared, e, da, px, py, mr, mc = line_residual(
-                ref[i], ux, uy, cur[j], c, s, pose, angle_gate, distance_gate
-            )
-            if shared <= 0.0:
+    pairs = np.empty((ref.shape[0] * cur.shape[0], 2), dtype=np.int64)
+    for p in range(lines_near(ref, along, cur, pose, angle_gate, pairs)):
+        i, j = pairs[p, 0], pairs[p, 1]
+        ux, uy = along[i, 0], along[i, 1]
+        shared, e, da, px, py, mr, mc = line_residual(
+            ref[i], ux, uy, cur[j], c, s, pose, angle_gate, distance_gate
+        )
+        if shared <= 0.0:
+            continue
+        nx, ny = -uy, ux
+        var, var_angle = weights_of(ref[i], cur[j], mr, mc)
+        w = huber(e, var, 3.0)
+        J = (nx, ny, -nx * (py - ty) + ny * (px - tx))
+        for a in range(3):
+            gain[a] = w * J[a]
+            for b in range(3):
+                H[a, b] += w * J[a] * J[b]
+            Gr[i, a, 0] -= gain[a] * mr
+            Gr[i, a, 1] -= gain[a]
+            Gc[j, a, 0] += gain[a] * mc
+            Gc[j, a, 1] += gain[a]
+        true = (ref_noise[i, 1] + cur_noise[j, 1]
+                + ref_noise[i, 0] * mr * mr + cur_noise[j, 0] * mc * mc)  # fmt: skip
+        squares += min(e * e / true, 9.0)
+        used += 1.0
+        w = huber(da, var_angle, 3.0)
+        H[2, 2] += w
+        Gr[i, 2, 0] -= w
+        Gc[j, 2, 0] += w
+        squares += min(da * da / (ref_noise[i, 0] + cur_noise[j, 0]), 9.0)
+        used += 1.0
+        for side in range(2):
+            if ref_ends[i, side] != EDGE or cur_ends[j, side] != EDGE:
                 continue
-            nx, ny = -uy, ux
-            var, var_angle = weights_of(ref[i], cur[j], mr, mc)
-            w = huber(e, var, 3.0)
-            J = (nx, ny, -nx * (py - ty) + ny * (px - tx))
+            qx = c * cur_edges[j, side, 0] - s * cur_edges[j, side, 1]
+            qy = s * cur_edges[j, side, 0] + c * cur_edges[j, side, 1]
+            e = ux * (qx + tx - ref_edges[i, side, 0]) + uy * (qy + ty - ref_edges[i, side, 1])
+            if abs(e) > distance_gate:
+                continue
+            w = huber(e, EDGE_VARIANCE, 2.0)
+            J = (ux, uy, -ux * qy + uy * qx)
             for a in range(3):
                 gain[a] = w * J[a]
                 for b in range(3):
                     H[a, b] += w * J[a] * J[b]
-                Gr[i, a, 0] -= gain[a] * mr
-                Gr[i, a, 1] -= gain[a]
-                Gc[j, a, 0] += gain[a] * mc
-                Gc[j, a, 1] += gain[a]
-            true = (ref_noise[i, 1] + cur_noise[j, 1]
-                    + ref_noise[i, 0] * mr * mr + cur_noise[j, 0] * mc * mc)  # fmt: skip
-            squares += min(e * e / true, 9.0)
-            used += 1.0
-            w = huber(da, var_angle, 3.0)
-            H[2, 2] += w
-            Gr[i, 2, 0] -= w
-            Gc[j, 2, 0] += w
-            squares += min(da * da / (ref_noise[i, 0] + cur_noise[j, 0]), 9.0)
-            used += 1.0
-            for side in range(2):
-                if ref_ends[i, side] != EDGE or cur_ends[j, side] != EDGE:
-                    continue
-                qx = c * cur_edges[j, side, 0] - s * cur_edges[j, side, 1]
-                qy = s * cur_edges[j, side, 0] + c * cur_edges[j, side, 1]
-                e = ux * (qx + tx - ref_edges[i, side, 0]) + uy * (qy + ty - ref_edges[i, side, 1])
-                if abs(e) > distance_gate:
-                    continue
-                w = huber(e, EDGE_VARIANCE, 2.0)
-                J = (ux, uy, -ux * qy + uy * qx)
-                for a in range(3):
-                    gain[a] = w * J[a]
-                    for b in range(3):
-                        H[a, b] += w * J[a] * J[b]
-                edge_noise(ref, ref_ends, ref_edges, ref_spacing, i, side, -1.0, gain, Gr, M)
-                edge_noise(cur, cur_ends, cur_edges, cur_spacing, j, side, 1.0, gain, Gc, M)
+            edge_noise(ref, ref_ends, ref_edges, ref_spacing, i, side, -1.0, gain, Gr, M)
+            edge_noise(cur, cur_ends, cur_edges, cur_spacing, j, side, 1.0, gain, Gc, M)
     add_squares(Gr, ref_noise, M)
     add_squares(Gc, cur_noise, M)
     return squares, used

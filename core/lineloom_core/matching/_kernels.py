@@ -39,21 +39,24 @@ from lineloom_core.matching._hypothesis import (
 from lineloom_core.matching._proposal_kernels import propose
 from lineloom_core.matching._refinement_kernels import refine_all
 
-COARSE_BASE, COARSE_SLOPE, COARSE_STRIDE = 0.26, 0.02, 0.25
+COARSE_BASE, COARSE_SLOPE, COARSE_STRIDE = 0.26, 0.02, 0.3
 FINE_BASE, FINE_SLOPE, FINE_STEP = 0.05, 0.005, 2
 """Range tolerances [m], their growth with range, metres of wall or beams from point to point."""
 SETTLED_ABOVE = 1500.0
 """Information [1/m^2] by lines above which free space cannot say more of a slide."""
 SLIDE_HALF, SLIDE_STEP, SLIDE_STRIDE, SLIDE_PULL = 0.4, 0.1, 0.1, 0.15
-ALWAYS_COARSE, ALWAYS_FINE, WORTH_A_LOOK = 6, 3, 0.5
-MOST_SLIDES = 8
+ALWAYS_COARSE, ALWAYS_FINE, WORTH_A_LOOK, WORTH_WHEN_SAFE = 6, 3, 0.5, 0.8
+MOST_SLIDES, HOPELESS = 8, 0.4
 SAFE_EVIDENCE, SAFE_WALLS, SAFE_LEAN, SAFE_RIVAL = 4.0, 3.0, 0.2, 0.5
 """Evidence [m], walls, metres that fix the weaker direction, and the rival's share of evidence."""
 
 
 @njit(cache=True)
-def settle_slide(ref, cur, ref_thin, cur_thin, H, pose):  # type: ignore[no-untyped-def]
-    """Where lines hardly fix `pose` along one direction, slide it to where the points fit best."""
+def settle_slide(ref, cur, ref_thin, cur_thin, H, pose, hopeless):  # type: ignore[no-untyped-def]
+    """Where lines hardly fix `pose` along one direction, slide it to where the points fit best.
+
+    hopeless: what matches less than this [m] stays where it is.
+    """
     least, direction = translation_information(H[0, 0], H[0, 1], H[0, 2], H[1, 1], H[1, 2], H[2, 2])
     if least >= SETTLED_ABOVE:
         return
@@ -61,8 +64,13 @@ def settle_slide(ref, cur, ref_thin, cur_thin, H, pose):  # type: ignore[no-unty
     n = int(SLIDE_HALF / SLIDE_STEP + 0.5)
     counts = np.empty(4)
     moved = pose.copy()
-    best, where = -np.inf, 0
+    judge_thinned(ref, cur, ref_thin, cur_thin, pose, FINE_BASE, FINE_SLOPE, counts)
+    best, where = SLIDE_STRIDE * (counts[MATCHED] - 3.0 * counts[CONFLICT]), 0
+    if SLIDE_STRIDE * counts[MATCHED] < hopeless:
+        return
     for k in range(-n, n + 1):
+        if k == 0:
+            continue
         moved[0], moved[1] = pose[0] + ux * k * SLIDE_STEP, pose[1] + uy * k * SLIDE_STEP
         judge_thinned(ref, cur, ref_thin, cur_thin, moved, FINE_BASE, FINE_SLOPE, counts)
         value = SLIDE_STRIDE * (counts[MATCHED] - 3.0 * counts[CONFLICT])
@@ -87,7 +95,8 @@ def settle(ref, cur, ref_thin, cur_thin, row, iterations, table, kept):  # type:
     )  # fmt: skip
     if overlap == 0.0 or is_known(table, kept, pose):
         return kept
-    settle_slide(ref, cur, ref_thin, cur_thin, H, pose)
+    hopeless = HOPELESS * table[:kept, 5].max() if kept > 0 else 0.0
+    settle_slide(ref, cur, ref_thin, cur_thin, H, pose, hopeless)
     if is_known(table, kept, pose):
         return kept
     counts = np.empty(4)
@@ -118,19 +127,6 @@ def rank_coarsely(ref, cur, proposals, most):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def settle_proposals(ref, cur, ref_thin, cur_thin, proposals, rank, most, iterations, table):  # type: ignore[no-untyped-def]
-    """Steps 4 and 5 on the best ranked proposals; returns the number of rows filled."""
-    order = np.argsort(-rank, kind="mergesort")
-    kept = 0
-    for q in range(min(order.shape[0], most)):
-        if q >= ALWAYS_FINE and rank[order[q]] < WORTH_A_LOOK * rank[order[0]]:
-            break
-        row = proposals[order[q]]
-        kept = settle(ref, cur, ref_thin, cur_thin, row, iterations, table, kept)
-    return kept
-
-
-@njit(cache=True)
 def best_first(table, kept):  # type: ignore[no-untyped-def]
     """The first `kept` rows by falling evidence; equals keep their order."""
     rank = np.empty(kept)
@@ -149,6 +145,31 @@ def is_safe(figures):  # type: ignore[no-untyped-def]
         and figures[LEAN] >= SAFE_LEAN
         and max(figures[OTHER], figures[SLIDE]) < SAFE_RIVAL * best
     )
+
+
+@njit(cache=True)
+def settle_proposals(  # type: ignore[no-untyped-def]
+    ref, cur, ref_thin, cur_thin, proposals, rank, most, iterations, table, figures
+):
+    """Steps 4, 5 and 7 on the best ranked proposals; returns the number of rows, best first.
+
+    Once a hypothesis is safe, only proposals that nearly rank with the best are looked at.
+    """
+    order = np.argsort(-rank, kind="mergesort")
+    kept, worth = 0, WORTH_A_LOOK
+    for q in range(min(order.shape[0], most)):
+        if q == ALWAYS_FINE:
+            table[:kept] = best_first(table, kept)
+            compare_with_rivals(ref, cur, table, kept, figures)
+            if is_safe(figures):
+                worth = WORTH_WHEN_SAFE
+        if q >= ALWAYS_FINE and rank[order[q]] < worth * rank[order[0]]:
+            break
+        row = proposals[order[q]]
+        kept = settle(ref, cur, ref_thin, cur_thin, row, iterations, table, kept)
+    table[:kept] = best_first(table, kept)
+    compare_with_rivals(ref, cur, table, kept, figures)
+    return kept
 
 
 @njit(cache=True)
@@ -171,12 +192,11 @@ def match_sweeps(ref, cur, search):  # type: ignore[no-untyped-def]
     cur_thin = thin_points(cur.points, cur.angle_increment, SLIDE_STRIDE)
     table = np.empty((search.fine_keep + MOST_SLIDES, COLUMNS))
     rank = rank_coarsely(ref, cur, proposals, search.coarse_keep)
-    kept = settle_proposals(
-        ref, cur, ref_thin, cur_thin, proposals, rank, search.fine_keep, search.iterations, table
-    )
-    table[:kept] = best_first(table, kept)
     figures = np.zeros(FIGURES)
-    compare_with_rivals(ref, cur, table, kept, figures)
+    kept = settle_proposals(
+        ref, cur, ref_thin, cur_thin, proposals, rank, search.fine_keep, search.iterations, table,
+        figures,
+    )  # fmt: skip
     if not is_safe(figures):
         slides = propose_slides(ref, cur, table, kept, figures, search.rotations, MOST_SLIDES)
         for k in range(slides.shape[0]):

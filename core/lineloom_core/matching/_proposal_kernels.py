@@ -158,17 +158,20 @@ def vote_translations(  # type: ignore[no-untyped-def]
     """
     c, s = math.cos(phi), math.sin(phi)
     offs = np.empty(count)
-    nx, ny = np.empty(count), np.empty(count)
-    ends = np.empty((count, 4))
+    ux, uy = np.empty(count), np.empty(count)
+    spans = np.empty((count, 5))
     for p in range(count):
         i, j = pairs[p, 0], pairs[p, 1]
-        nx[p], ny[p] = -math.sin(ref[i, THETA]), math.cos(ref[i, THETA])
-        ends[p, 0] = c * cur[j, X1] - s * cur[j, Y1]
-        ends[p, 1] = s * cur[j, X1] + c * cur[j, Y1]
-        ends[p, 2] = c * cur[j, X2] - s * cur[j, Y2]
-        ends[p, 3] = s * cur[j, X2] + c * cur[j, Y2]
-        mx, my = 0.5 * (ends[p, 0] + ends[p, 2]), 0.5 * (ends[p, 1] + ends[p, 3])
-        offs[p] = ref[i, OFFSET] - (nx[p] * mx + ny[p] * my)
+        ux[p], uy[p] = math.cos(ref[i, THETA]), math.sin(ref[i, THETA])
+        ax, ay = c * cur[j, X1] - s * cur[j, Y1], s * cur[j, X1] + c * cur[j, Y1]
+        bx, by = c * cur[j, X2] - s * cur[j, Y2], s * cur[j, X2] + c * cur[j, Y2]
+        offs[p] = ref[i, OFFSET] - 0.5 * (ux[p] * (ay + by) - uy[p] * (ax + bx))
+        # Along the reference line: where it lies, where the current one does, what they must share.
+        spans[p, 0] = ux[p] * ref[i, X1] + uy[p] * ref[i, Y1]
+        spans[p, 1] = spans[p, 0] + ref[i, LENGTH]
+        ta, tb = ux[p] * ax + uy[p] * ay, ux[p] * bx + uy[p] * by
+        spans[p, 2], spans[p, 3] = min(ta, tb), max(ta, tb)
+        spans[p, 4] = 0.3 * min(ref[i, LENGTH], cur[j, LENGTH])
     used = 0
     for p in range(count):
         i, j = pairs[p, 0], pairs[p, 1]
@@ -181,23 +184,20 @@ def vote_translations(  # type: ignore[no-untyped-def]
                 w = 0.7 * min(wp, 1.0)
                 used = add_vote(slots, cells, used, cell, half, w, tx, ty)
         for q in range(p + 1, count):
-            k, m = pairs[q, 0], pairs[q, 1]
-            if i == k or j == m:
+            sine = ux[p] * uy[q] - uy[p] * ux[q]
+            if abs(sine) < 0.3 or i == pairs[q, 0] or j == pairs[q, 1]:
                 continue
-            sine = nx[p] * ny[q] - ny[p] * nx[q]
-            if abs(sine) < 0.3:
-                continue
-            tx = (offs[p] * ny[q] - offs[q] * ny[p]) / sine
-            ty = (nx[p] * offs[q] - nx[q] * offs[p]) / sine
+            tx = (offs[p] * ux[q] - offs[q] * ux[p]) / sine
+            ty = (offs[p] * uy[q] - offs[q] * uy[p]) / sine
             if abs(tx) > half or abs(ty) > half:
                 continue
-            op = overlap_length(ref[i], ny[p], -nx[p], ends[p, 0] + tx, ends[p, 1] + ty,
-                                ends[p, 2] + tx, ends[p, 3] + ty)  # fmt: skip
-            if op < 0.3 * min(ref[i, LENGTH], cur[j, LENGTH]):
+            along = ux[p] * tx + uy[p] * ty
+            op = min(spans[p, 1], spans[p, 3] + along) - max(spans[p, 0], spans[p, 2] + along)
+            if op < spans[p, 4]:
                 continue
-            oq = overlap_length(ref[k], ny[q], -nx[q], ends[q, 0] + tx, ends[q, 1] + ty,
-                                ends[q, 2] + tx, ends[q, 3] + ty)  # fmt: skip
-            if oq < 0.3 * min(ref[k, LENGTH], cur[m, LENGTH]):
+            along = ux[q] * tx + uy[q] * ty
+            oq = min(spans[q, 1], spans[q, 3] + along) - max(spans[q, 0], spans[q, 2] + along)
+            if oq < spans[q, 4]:
                 continue
             w = math.sqrt(min(op, LONG_ENOUGH) * min(oq, LONG_ENOUGH))
             used = add_vote(slots, cells, used, cell, half, w, tx, ty)

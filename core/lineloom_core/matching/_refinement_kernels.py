@@ -32,8 +32,8 @@ EDGE_VARIANCE = 0.0025
 """Of a corner or a wall's end along the wall [m^2]."""
 LAST_ANGLE_GATE, LAST_DISTANCE_GATE = math.radians(3.0), 0.12
 """What the gates shrink to."""
-MOST_TURNED = math.radians(13.0)
-"""Farther than this no refinement turns."""
+MOST_TURNED, MOST_MOVED = math.radians(8.0), 0.6
+"""Farther than this [rad, m] no refinement takes a pose."""
 
 
 @njit(cache=True)
@@ -127,12 +127,24 @@ def directions(lines):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def lines_alike(ref, cur, phi, reach, pairs):  # type: ignore[no-untyped-def]
-    """Fill `pairs` (i, j) with the lines that lie within `reach` of one direction under phi."""
+def lines_near(ref, ref_along, cur, pose, angle_reach, pairs):  # type: ignore[no-untyped-def]
+    """Fill `pairs` (i, j) with the lines that may come to lie on each other near `pose`.
+
+    Their directions differ by up to `angle_reach`, and the middle of one is not much farther from
+    the other than turning by MOST_TURNED and moving by MOST_MOVED can make up for.
+    """
+    c, s = math.cos(pose[2]), math.sin(pose[2])
     count = 0
     for j in range(cur.shape[0]):
+        mx, my = 0.5 * (cur[j, X1] + cur[j, X2]), 0.5 * (cur[j, Y1] + cur[j, Y2])
+        rx, ry = c * mx - s * my, s * mx + c * my
+        slack = MOST_MOVED + MOST_TURNED * math.sqrt(rx * rx + ry * ry)
+        x, y = rx + pose[0], ry + pose[1]
         for i in range(ref.shape[0]):
-            if abs(wrap_angle(ref[i, THETA] - cur[j, THETA] - phi)) <= reach:
+            across = ref_along[i, 0] * y - ref_along[i, 1] * x - ref[i, OFFSET]
+            if abs(across) > slack + MOST_TURNED * (0.5 * cur[j, LENGTH] + ref[i, LENGTH]):
+                continue
+            if abs(wrap_angle(ref[i, THETA] - cur[j, THETA] - pose[2])) <= angle_reach:
                 pairs[count, 0], pairs[count, 1] = i, j
                 count += 1
     return count
@@ -206,7 +218,7 @@ def refine_all(  # type: ignore[no-untyped-def]
     g, A = np.zeros(3), np.empty((3, 3))
     along = directions(ref)
     pairs = np.empty((ref.shape[0] * cur.shape[0], 2), dtype=np.int64)
-    count = lines_alike(ref, cur, pose[2], angle_gate + MOST_TURNED, pairs)
+    count = lines_near(ref, along, cur, pose, angle_gate + MOST_TURNED, pairs)
     for it in range(iterations + 1):
         H[:] = 0.0
         g[:] = 0.0
