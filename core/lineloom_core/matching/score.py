@@ -17,27 +17,22 @@ FAMILY_FEATURES = (
     "walls", "loose", "turn",
 )  # fmt: skip
 FAMILY_WEIGHTS = (
-    0.973,
-    -0.410,
-    -2.123,
-    -0.455,
-    1.067,
-    0.666,
-    -0.332,
-    0.117,
-    5.112,
-    1.977,
-    -0.473,
+    -0.277,
+    -0.385,
+    -2.179,
+    -0.056,
+    0.318,
+    1.136,
+    -0.133,
+    -0.263,
+    3.822,
+    1.416,
+    -0.101,
 )
-FAMILY_BIAS = -5.565
+FAMILY_BIAS = -4.219
 SLIDE_FEATURES = ("margin", "lead", "weaker", "loose")
-SLIDE_WEIGHTS = (
-    0.690,
-    1.151,
-    2.897,
-    -0.011,
-)
-SLIDE_BIAS = -0.052
+SLIDE_WEIGHTS = (-0.146, 2.455, 2.233, 0.139)
+SLIDE_BIAS = -1.318
 
 
 @dataclass(frozen=True, slots=True)

@@ -85,11 +85,17 @@ def is_twin(row: Floats, rows: list[Floats], apart: float) -> bool:
     return any(abs(wrap(r[2] - row[2])) < 0.03 for r in near)
 
 
-def slid(ref: ScanFeatures, cur: ScanFeatures, pose: Floats, H: Floats) -> Floats:
-    """Along the direction that lines fix least, where they fix it little: the best of nine."""
+def slid(ref: ScanFeatures, cur: ScanFeatures, pose: Floats, H: Floats, hopeless: float) -> Floats:
+    """Along the direction that lines fix least, where they fix it little: the best of nine.
+
+    Nothing is slid that matches less than `hopeless` metres.
+    """
     schur = H[:2, :2] - np.outer(H[:2, 2], H[:2, 2]) / H[2, 2]
     values, vectors = np.linalg.eigh(schur)
     if values[0] >= _kernels.SETTLED_ABOVE:
+        return pose
+    here = judged_thinned(ref, cur, pose, _kernels.SLIDE_STRIDE, *FINE)
+    if _kernels.SLIDE_STRIDE * here[MATCHED] < hopeless:
         return pose
     u = vectors[:, 0] * (1.0 if vectors[1, 0] >= 0.0 else -1.0)
     found = []
@@ -101,15 +107,18 @@ def slid(ref: ScanFeatures, cur: ScanFeatures, pose: Floats, H: Floats) -> Float
     return max(found, key=lambda pair: pair[0])[1]
 
 
-def settled(ref: ScanFeatures, cur: ScanFeatures, proposal: Floats, iterations: int) -> Floats:
-    """One hypothesis refined, slid and judged, as a row."""
+def settled(
+    ref: ScanFeatures, cur: ScanFeatures, proposal: Floats, iterations: int, rows: list[Floats]
+) -> Floats:
+    """One hypothesis refined, slid and judged, as a row; `rows` are settled already."""
     pose, H = proposal[:3].copy(), np.empty((3, 3))
     r, c = Sweep.of(ref), Sweep.of(cur)
     overlap = refine_all(
         r.lines, r.ends, r.edges, r.circles, c.lines, c.ends, c.edges, c.circles,
         pose, H, iterations,
     )  # fmt: skip
-    pose = slid(ref, cur, pose, H) if overlap > 0.0 else pose
+    hopeless = _kernels.HOPELESS * max((r[5] for r in rows), default=0.0)
+    pose = slid(ref, cur, pose, H, hopeless) if overlap > 0.0 else pose
     counts = judged(ref, cur, pose)
     return np.array([*pose, *proposal[3:5], *counts, overlap, *H[np.triu_indices(3)]])
 
@@ -130,10 +139,15 @@ def slow_votes(
         ranks.append(row[3] + _kernels.COARSE_STRIDE * gain)
     rows: list[Floats] = []
     order = sorted(range(len(ranks)), key=lambda k: -ranks[k])[: search.fine_keep]
+    worth = _kernels.WORTH_A_LOOK
     for q, k in enumerate(order):
-        if q >= 3 and ranks[k] < 0.5 * ranks[order[0]]:
+        if q == 3:
+            rows.sort(key=lambda row: -evidence(row))
+            if _kernels.is_safe(figures_of(ref, cur, rows)):
+                worth = _kernels.WORTH_WHEN_SAFE
+        if q >= 3 and ranks[k] < worth * ranks[order[0]]:
             break
-        row = settled(ref, cur, proposals[k], search.iterations)
+        row = settled(ref, cur, proposals[k], search.iterations, rows)
         if row[9] > 0.0 and not is_twin(row, rows, apart):
             rows.append(row)
     return sorted(rows, key=lambda row: -evidence(row))
@@ -157,7 +171,7 @@ def slow_match(ref: ScanFeatures, cur: ScanFeatures, search: Search) -> Floats:
             _kernels.MOST_SLIDES,
         )  # fmt: skip
         for proposal in slides:
-            row = settled(ref, cur, proposal, search.iterations)
+            row = settled(ref, cur, proposal, search.iterations, rows)
             if row[9] > 0.0 and not is_twin(row, rows, 0.08):
                 rows.append(row)
         rows = sorted(rows, key=lambda row: -evidence(row))
