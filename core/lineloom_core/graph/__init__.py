@@ -13,7 +13,7 @@ from lineloom_core.graph.covariance import (
     in_map_axes,
     marginal_covariance,
 )
-from lineloom_core.graph.edge import Edge, EdgeKind, chi_squared
+from lineloom_core.graph.edge import Edge, EdgeKind, chi_squared, tangent_errors
 from lineloom_core.graph.initialise import initialise_from_tree, rigid_join
 from lineloom_core.graph.inliers import InlierTest, select_inliers
 from lineloom_core.graph.observability import Observability, observe, project_out_weak
@@ -43,4 +43,5 @@ __all__ = [
     "project_out_weak",
     "rigid_join",
     "select_inliers",
+    "tangent_errors",
 ]

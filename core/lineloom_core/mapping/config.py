@@ -71,6 +71,24 @@ class JoinConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class DoubtConfig:
+    """When what was believed is withdrawn.
+
+    most_compared: places that a new one is held against. most_missing: share of what stood still
+    for one track and is missing for another, beyond the usual, over at least `least_compared` pairs
+    of places and `least_points` points. most_strain [m], most_turn [rad]: how far the solved graph
+    may be from what a loop says.
+    """
+
+    most_compared: int = 6
+    least_compared: int = 4
+    least_points: int = 1500
+    most_missing: float = 0.04
+    most_strain: float = 0.5
+    most_turn: float = 0.12
+
+
+@dataclass(frozen=True, slots=True)
 class MapperConfig:
     """Parameters of `SiteMapper`; the defaults are those that every figure was measured with."""
 
@@ -80,6 +98,7 @@ class MapperConfig:
     recognition: RecognitionConfig = field(default_factory=RecognitionConfig)
     closure: ClosureConfig = field(default_factory=ClosureConfig)
     join: JoinConfig = field(default_factory=JoinConfig)
+    doubt: DoubtConfig = field(default_factory=DoubtConfig)
     fusion: FusionConfig = field(default_factory=FusionConfig)
     persistence: PersistenceConfig = field(default_factory=PersistenceConfig)
     least_fit_late: float = 0.6

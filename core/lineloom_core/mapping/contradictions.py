@@ -1,12 +1,120 @@
-"""Second thoughts: what a new place shows to be wrong about what was believed."""
+"""Second thoughts: what a new place shows to be wrong about what was believed.
+
+Steps of `contradicted_by`: 1. hold the new place against those of other tracks that the map puts
+around it, and add up what is missing; 2. where too much of what stood still is missing between two
+tracks, the meeting that they rest on was false: name its whole set; 3. name loops that the solved
+graph does not bear out. What is named is withdrawn, and the history gone through without it.
+"""
 
 from __future__ import annotations
 
+import itertools
+
+import networkx as nx
+import numpy as np
+
+from lineloom_core.graph import tangent_errors
 from lineloom_core.mapping.constraint import Constraint
+from lineloom_core.mapping.overlap import count_steady_nearby, usual_missing
 from lineloom_core.mapping.site_map import SiteMap
-from lineloom_core.places import Place
+from lineloom_core.places import Place, missing_share
+
+TrackPair = tuple[str, str]
 
 
 def contradicted_by(site: SiteMap, place: Place) -> tuple[Constraint, ...]:
     """Accepted constraints that are not to be believed any more, given the new place."""
-    return ()
+    for pair in _compare(site, place):
+        false = _false_meeting(site, pair)
+        if false:
+            return false
+    return _strained(site, place)
+
+
+def _compare(site: SiteMap, place: Place) -> list[TrackPair]:
+    """Step 1; return the pairs of tracks that there is news of."""
+    here = site.pose(place.anchor)
+    own = site.track(place.anchor).id
+    near = sorted(
+        (here.distance(site.pose(other.anchor)), other.id)
+        for other in site.places.values()
+        if site.track(other.anchor).id != own and site.same_component(other.anchor, place.anchor)
+    )
+    pairs: dict[TrackPair, None] = {}
+    for distance, number in near[: site.config.doubt.most_compared]:
+        if distance > site.config.places.span:
+            break
+        other = site.places[number]
+        theirs = site.track(other.anchor).id
+        T = site.pose(other.anchor).between(here)
+        matched, missing = count_steady_nearby(other, place, T)
+        pair = (min(own, theirs), max(own, theirs))
+        before = site.overlaps.get(pair, (0, 0, 0))
+        site.overlaps[pair] = (before[0] + matched, before[1] + missing, before[2] + 1)
+        pairs[pair] = None
+    return list(pairs)
+
+
+def _false_meeting(site: SiteMap, pair: TrackPair) -> tuple[Constraint, ...]:
+    """Step 2: the weakest meeting between two tracks, if their maps contradict each other."""
+    config = site.config.doubt
+    matched, missing, compared = site.overlaps[pair]
+    if compared < config.least_compared or matched + missing < config.least_points:
+        return ()
+    share = missing_share(matched, missing)
+    if share <= config.most_missing:
+        return ()
+    share -= usual_missing(site, [p for p in site.places.values() if _on(site, p, pair)])
+    if share <= config.most_missing:
+        return ()
+    reason = f"withdrawn: {share:.1%} of what stood still for one is missing for the other"
+    return tuple(c.moved_to("retracted", reason, site.now) for c in _weakest_meeting(site, *pair))
+
+
+def _on(site: SiteMap, place: Place, pair: TrackPair) -> bool:
+    return site.track(place.anchor).id in pair
+
+
+def _weakest_meeting(site: SiteMap, track_a: str, track_b: str) -> list[Constraint]:
+    """The set with the least evidence among those that link two tracks; what is approved stays."""
+    meetings: dict[tuple[str, ...], list[Constraint]] = {}
+    links = nx.Graph()
+    for c in site.constraints.values():
+        if c.kind == "rendezvous" and c.state == "accepted":
+            meetings.setdefault(c.consistency_set, []).append(c)
+            ends = (site.track(c.keyframe_a).id, site.track(c.keyframe_b).id)
+            links.add_edge(*ends, meeting=c.consistency_set)
+    if track_a not in links or track_b not in links or not nx.has_path(links, track_a, track_b):
+        return []
+    way = nx.shortest_path(links, track_a, track_b)
+    on_the_way = {links.edges[a, b]["meeting"]: None for a, b in itertools.pairwise(way)}
+    doubtful = [m for m in on_the_way if not site.verdicts.approved & set(m)]
+    if not doubtful:
+        return []
+    return meetings[min(doubtful, key=lambda m: (sum(c.evidence for c in meetings[m]), m))]
+
+
+def _strained(site: SiteMap, place: Place) -> tuple[Constraint, ...]:
+    """Step 3: accepted loops that the graph has solved far away from what they say."""
+    root = site.component_root(place.anchor)
+    loops = [
+        c
+        for c in site.constraints.values()
+        if c.kind == "loop"
+        and c.state == "accepted"
+        and c.id not in site.verdicts.approved
+        and site.component_root(c.keyframe_a) == root
+    ]
+    if not loops or site.unsolved.get(root):
+        return ()
+    errors = tangent_errors([c.edge() for c in loops], site.graph.nodes)
+    config = site.config.doubt
+    strained = (np.hypot(errors[:, 0], errors[:, 1]) > config.most_strain) | (
+        np.abs(errors[:, 2]) > config.most_turn
+    )
+    reason = "withdrawn: the graph contradicts it"
+    return tuple(
+        c.moved_to("retracted", reason, site.now)
+        for c, bad in zip(loops, strained, strict=True)
+        if bad
+    )

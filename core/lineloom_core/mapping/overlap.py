@@ -58,7 +58,7 @@ def overlap_of_sets(site: SiteMap, chosen: list[Constraint], poses: Mapping[int,
     """
     near_a = places_near(site, [c.keyframe_a for c in chosen])
     near_b = places_near(site, [c.keyframe_b for c in chosen])
-    usual = 0.5 * (_usual(site, near_a) + _usual(site, near_b))
+    usual = 0.5 * (usual_missing(site, near_a) + usual_missing(site, near_b))
     matched, missing = _total(
         count_steady(site.places[c.place_a], site.places[c.place_b], T_places(site, c))
         for c in chosen
@@ -112,7 +112,7 @@ def _looseness(site: SiteMap, matched: int, place: int) -> float:
     return float(0.5 * (drift[0, 0] + drift[1, 1]) + CONSTRAINT_FLOOR[2, 2] * lever**2)
 
 
-def _usual(site: SiteMap, places: Iterable[Place]) -> float:
+def usual_missing(site: SiteMap, places: Iterable[Place]) -> float:
     """What robots miss in their own successive places, whose relative poses are known well."""
     by_track: dict[str, list[Place]] = {}
     for place in places:

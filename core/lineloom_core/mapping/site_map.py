@@ -46,6 +46,9 @@ class SiteMap:
         self.looped_tracks: dict[str, None] = {}
         self.unsolved: dict[int, int] = {}
         """By component root: closures accepted since it was last solved."""
+        self.overlaps: dict[tuple[str, str], tuple[int, int, int]] = {}
+        """By pair of tracks since they met: steady points that both saw, those that one missed, and
+        pairs of places compared (`contradictions`)."""
         self.now = 0
         """Version of the latest keyframe: when what is decided now is decided."""
         self._track_of: dict[int, Track] = {}

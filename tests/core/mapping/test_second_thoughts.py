@@ -1,0 +1,59 @@
+"""Self-correction: a false meeting that was believed is withdrawn and leaves no trace."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from lineloom_core.evaluation.merge_bench_buildings import building_classes
+from lineloom_core.evaluation.merge_bench_fleets import bench_fleet
+from lineloom_core.evaluation.merge_bench_judge import Judge
+from lineloom_core.mapping.config import JoinConfig, MapperConfig
+from lineloom_core.mapping.site_mapper import SiteMapper
+
+from tests.core.mapping.drives import fingerprint
+
+HASTY = MapperConfig(
+    join=JoinConfig(
+        doubted_points=0.0, most_missing=0.05, most_map_missing=1.0, least_distinctive=0
+    )
+)
+"""Believes what any three matches say, as long as nothing speaks loudly against it."""
+
+
+def test_a_false_meeting_is_withdrawn_when_later_scans_contradict_it() -> None:
+    # A hotel whose rooms share their walls: soon joined one door off, rightly half a minute on.
+    kind = next(k for k in building_classes(None) if k.name == "hotel floor")
+    fleet = bench_fleet(kind, 3, 8, 75.0)
+    judge, scans = Judge(fleet), [s for s in fleet.scans() if s.time_s < 26.0]
+    mapper, ever_false = SiteMapper(HASTY), False
+    withdrawn: list[str] = []
+    for s in scans:
+        judge.note(s)
+        changes = mapper.add(s.robot, s.scan)
+        if changes.merges:
+            ever_false = ever_false or bool(judge.verdict(mapper.view()).false)
+        withdrawn += changes.withdrawn
+    assert ever_false, "the fleet is no test: nothing false was believed"
+    assert withdrawn
+    verdict = judge.verdict(mapper.view())
+    assert not verdict.false
+    assert len(verdict.right) == 1
+    rows = {c.id: c for c in mapper.view().constraints}
+    for name in withdrawn:
+        assert rows[name].state == "retracted"
+        assert rows[name].reason.startswith("withdrawn: ")
+        assert [h.state for h in rows[name].history][-2:] == ["accepted", "retracted"]
+    assert mapper.verdicts.withdrawn.keys() >= set(withdrawn)
+
+    # As if it had never been believed: a mapper that is told beforehand ends with the same map.
+    told = SiteMapper(HASTY, verdicts=mapper.verdicts)
+    for s in scans:
+        told.add(s.robot, s.scan)
+    kept = [replace(m.view(), constraints=()) for m in (mapper, told)]
+    assert fingerprint(kept[0]) == fingerprint(kept[1])
+
+    # And what an operator restores is not withdrawn again.
+    first = next(name for name in withdrawn if name in mapper.verdicts.withdrawn)
+    mapper.reinstate(first)
+    assert first not in mapper.verdicts.withdrawn
+    assert first in mapper.verdicts.approved
