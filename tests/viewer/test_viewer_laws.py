@@ -201,3 +201,33 @@ def test_history_keeps_first_and_last_and_bounds_itself(run: Run) -> None:
     assert len(kept) <= 300
     assert (kept[0], kept[-1]) == (0, 999)
     assert kept == sorted(set(kept))
+
+
+def test_changes_make_the_same_map_as_the_whole(run: Run) -> None:
+    found = run(
+        "net/map_copy.js",
+        """
+        const line = (i, support) => ({ id: `l${i}`, support });
+        const first = Array.from({ length: 3000 }, (_, i) => line(i, 1));
+        const second = [...first.slice(10), line(5000, 1)];
+        second[0] = line(10, 7);
+        const asked = [];
+        const api = {
+            get: async (path) => { asked.push(path); return { version: 4, lines: first }; },
+            open: async (path) => {
+                asked.push(path);
+                const removed = first.slice(0, 10).map(({ id }) => id);
+                const lines = [second[0], line(5000, 1)];
+                const change = { version: 9, full: false, removed, lines };
+                return { json: async () => change };
+            },
+        };
+        const copy = new m.MapCopy(api, "map");
+        await copy.current();
+        const now = await copy.current();
+        copy.forget();
+        await copy.current();
+        return [asked, now.version, JSON.stringify(now.lines) === JSON.stringify(second)];
+        """,
+    )
+    assert found == [["map", "map?since=4", "map"], 9, True]

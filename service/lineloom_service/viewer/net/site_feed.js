@@ -93,6 +93,7 @@ export class SiteFeed {
     if (document.hidden) return;
     // Without events, only the version tells that something has changed.
     const changed = site.version !== this._version;
+    if (site.version < this._version) this._reader.forget();
     if (what === "all" || (changed && !this._streaming)) {
       const state = await this._reader.state();
       if (this._stopped) return;
@@ -132,6 +133,7 @@ export class SiteFeed {
       if (this._due === "none") this._due = "robots";
     } else {
       this._due = "all";
+      if (event.type === "reset") this._reader.forget();
       this._listener.onEvent(event);
     }
     this._wake();
@@ -142,6 +144,7 @@ export class SiteFeed {
     if (this._stopped) return;
     this._due = "all";
     this._failures += 1;
+    this._reader.forget();
     if (error instanceof ProblemError) {
       const known = { 401: "unauthorised", 403: "forbidden", 404: "empty" }[error.status];
       this._listener.onConnection(/** @type {Connection} */ (known ?? "failed"), error.message);

@@ -1,4 +1,5 @@
 import { SiteState } from "../data/site_state.js";
+import { MapCopy } from "./map_copy.js";
 
 const PAGE = 1000;
 
@@ -8,6 +9,12 @@ export class SiteReader {
   constructor(api, site) {
     this._api = api;
     this._path = `v1/sites/${encodeURIComponent(site)}`;
+    this._map = new MapCopy(api, `${this._path}/map`);
+  }
+
+  /** Forget what was received: what comes next is another history. */
+  forget() {
+    this._map.forget();
   }
 
   /** Return how the site is doing. @returns {Promise<import("./contract.js").SiteAnswer>} */
@@ -33,7 +40,7 @@ export class SiteReader {
   async _answers() {
     const [site, map, robots, graph, constraints] = await Promise.all([
       this.site(),
-      this._api.get(`${this._path}/map`),
+      this._map.current(),
       this.robots(),
       this._api.get(`${this._path}/graph`),
       this._constraints(),
