@@ -180,7 +180,7 @@ def test_the_real_map_is_bit_identical_after_dozens_of_kills(tmp_path: Path) -> 
 
 def _driven() -> Scans:
     """What a robot sees on a tour of an office floor, over and over."""
-    fleet = Fleet.office(1, seed=4)
+    fleet = Fleet.office(seed=4, robots=1)
     recorded = [record_to_json(ScanRecord(seen.scan)) for seen in islice(fleet.scans(), 800)]
 
     def scan(seq: int) -> dict[str, Any]:

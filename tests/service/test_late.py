@@ -56,6 +56,7 @@ async def _logged(
             if not record.held:
                 break
             await asyncio.sleep(0.01)
+        assert record is not None
         entries = await store.read_feed(record.id, 0, 10**5)
         await store.close()
     return entries, accepted

@@ -121,6 +121,11 @@ class Conductor:
         done = 0 if runner is None else runner.done
         return max(done, self.published(site_id).position)
 
+    def trouble(self, site_id: int) -> str | None:
+        """Return why a site is not mapped just now, None where all is well."""
+        runner = self._runners.get(site_id)
+        return None if runner is None else runner.trouble
+
     def skips(self, site_id: int) -> list[Skip]:
         """Return the entries of a site that are not in its map for good."""
         return list(self.published(site_id).skips)

@@ -25,6 +25,7 @@ _LOG = logging.getLogger(__name__)
 _FEEDS_UNDER_WAY = 2
 """One being mapped, the next one waiting at the worker's door."""
 
+_AGAIN_S = 1.0
 _GATHER_S = 0.02
 """A site that was idle waits so long for more: one by one, scans cost several times as much."""
 
@@ -62,6 +63,8 @@ class SiteRunner:
         self.skips: dict[int, Skip] = {}
         self.published: Published | None = None
         self.restored = asyncio.Event()
+        self.trouble: str | None = None
+        """Why the site is not mapped just now."""
         self._end = record.position
         self._store = store
         self._engine = engine
@@ -113,9 +116,12 @@ class SiteRunner:
                     await self._strike(death.position, how, death.reason)
             except RestoreFailedError as failure:
                 await self._drop_snapshot(str(failure))
-            except StoreError:
-                _LOG.exception("site %s: the storage failed, trying again", self.name)
-                await asyncio.sleep(1.0)
+            except StoreError as error:
+                if self.trouble is None:
+                    _LOG.exception("site %s: its log cannot be read, trying again", self.name)
+                self.trouble = f"its log cannot be read: {error}"
+                self.restored.set()  # one broken site does not keep the others from being served
+                await asyncio.sleep(_AGAIN_S)
 
     async def save(self) -> None:
         """Save a snapshot if anything was mapped since the last one. Nothing may be under way."""
@@ -170,6 +176,7 @@ class SiteRunner:
             self._end = self._sent
             return
         wanted: list[LogEntry] = [e for e in entries if e.position not in self.skips]
+        self.trouble = None
         self._sent = entries[-1].position
         self._scans_sent += sum(entry.kind == "scan" for entry in wanted)
         self._marks[self._sent] = self._scans_sent
