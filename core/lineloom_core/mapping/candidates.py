@@ -30,7 +30,10 @@ _REFUSED_KEPT = 3
 
 def consider(site: SiteMap, place: Place) -> tuple[list[ComponentMerged], bool]:
     """Look for a new place among all others; return the merges and whether poses moved."""
-    found = [_try(site, other, place) for other in _worth_trying(site, place)]
+    likely = site.memory.index.shortlist(
+        place, _worth_trying(site, place), site.config.places.shortlist
+    )
+    found = [_try(site, other, place) for other in likely]
     fresh = [c for c in found if c is not None and c.state == "candidate"]
     refused = [c for c in found if c is not None and c.state == "rejected"]
     refused.sort(key=lambda c: (-c.evidence, c.id))

@@ -14,12 +14,16 @@ from lineloom_core.places.recognition import RecognitionConfig
 
 @dataclass(frozen=True, slots=True)
 class PlaceConfig:
-    """span: metres of way in a place; stride: how far apart places begin; most_keyframes in one."""
+    """span: metres of way in a place; stride: how far apart places begin; most_keyframes in one.
+
+    shortlist: where more places than this are worth trying, the likeliest are.
+    """
 
     span: float = 5.0
     stride: float = 2.5
     most_keyframes: int = 14
     least_keyframes: int = 4
+    shortlist: int = 48
 
 
 @dataclass(frozen=True, slots=True)

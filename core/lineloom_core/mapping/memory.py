@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from lineloom_core.geometry import Pose
 from lineloom_core.places import (
     Place,
+    PlaceIndex,
     Recognition,
     RecognitionConfig,
     count_steady,
@@ -28,6 +29,7 @@ class Memory:
     def __init__(self, config: RecognitionConfig) -> None:
         self._config = config
         self.places: dict[int, Place] = {}
+        self.index = PlaceIndex()
         self._recognitions: dict[Pair, Recognition] = {}
         self._hypotheses: dict[Pair, NDArray[np.float64]] = {}
         self._look_alikes: dict[Pair, NDArray[np.float64]] = {}
@@ -67,6 +69,7 @@ class Memory:
 
     def forget(self, keyframes: set[int]) -> None:
         """Drop what rests on keyframes that are gone; a place is named by its last one."""
+        self.index = PlaceIndex()
         self.places = {p: place for p, place in self.places.items() if p not in keyframes}
         self._recognitions = _kept(self._recognitions, keyframes)
         self._hypotheses = _kept(self._hypotheses, keyframes)

@@ -1,5 +1,6 @@
 """Places: submaps that are recognised without any pose."""
 
+from lineloom_core.places.index import PlaceIndex
 from lineloom_core.places.place import (
     Glimpse,
     Place,
@@ -24,6 +25,7 @@ from lineloom_core.places.recognition import (
 __all__ = [
     "Glimpse",
     "Place",
+    "PlaceIndex",
     "Recognition",
     "RecognitionConfig",
     "alias_evidence",
