@@ -46,7 +46,10 @@ def _token(directory: Path, port: int) -> Iterator[str]:
 
 def _try_everything(port: int, token: str, directory: Path, examples: int) -> None:
     command = [str(Path(sys.executable).with_name("schemathesis")), "--config-file", str(CONFIG)]
-    command += ["run", f"http://127.0.0.1:{port}/openapi.json", "--checks", "all", "--no-color"]
+    command += ["run", f"http://127.0.0.1:{port}/openapi.json", "--no-color"]
+    # All but one: sites and robots are created on first use, so a PUT after a DELETE brings the
+    # name back. That deleting leaves nothing is tested in test_actions.py and in the store's tests.
+    command += ["--checks", "all", "--exclude-checks", "use_after_free"]
     command += ["--max-examples", str(examples), "--generation-deterministic"]
     command += ["--phases", "examples,coverage,fuzzing,stateful"]
     environment = {**os.environ, "LINELOOM_TOKEN": token}
