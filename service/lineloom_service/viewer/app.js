@@ -101,6 +101,7 @@ export class App {
 
   /** Ask where a scan was taken. @param {File} file */
   async localize(file) {
+    this.notices.say(`Looking for ${file.name} in the map`);
     try {
       await this.localizer.ask(this.site, file);
     } catch (error) {
