@@ -1,7 +1,7 @@
 """Following one robot from scan to scan, without odometry.
 
 Steps of `Tracker.track`:
- 1. predict the pose from the velocity of the last step (and from odometry where there is any);
+ 1. predict the pose from the velocity of the last step (and from odometry that is believed);
  2. search a window around each prediction against the local map, wider the longer the gap;
  3. register the best by points and normals, the prediction holding only what nothing observes;
  4. check: enough of the scan must lie on known surfaces, and none of it where the keyframe saw
@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any, Literal
 
 import numpy as np
@@ -28,6 +29,7 @@ from lineloom_core.features import ScanFeatures
 from lineloom_core.geometry import Pose
 from lineloom_core.graph import observe, project_out_weak
 from lineloom_core.mapping.drift import NoiseFigure
+from lineloom_core.mapping.wheels import Wheels
 from lineloom_core.matching.free_space import judge_sweeps
 from lineloom_core.matching.local_map import Cloud, LocalMap, Registration
 from lineloom_core.timing import timed
@@ -41,7 +43,8 @@ Status = Literal["first", "tracked", "skipped", "lost"]
 class TrackerConfig:
     """Parameters of the tracker; metres, radians, seconds.
 
-    memory: keyframes in the local map. keyframe_distance, keyframe_angle: how far to the next
+    memory: keyframes in the local map; noisy_memory: in that of a robot whose noise figure (see
+    `drift`) lies above noisy_above. keyframe_distance, keyframe_angle: how far to the next
     keyframe. least_fit: share of a scan that must lie on known surfaces; low, for a turn into a
     new room shows mostly new walls. enough_fit: below it the scan becomes a keyframe, since so
     much of it is new. most_conflict: share of
@@ -52,6 +55,8 @@ class TrackerConfig:
     """
 
     memory: int = 8
+    noisy_memory: int = 32
+    noisy_above: float = 1.2
     keyframe_distance: float = 0.4
     keyframe_angle: float = math.radians(20.0)
     least_fit: float = 0.2
@@ -86,7 +91,7 @@ class Tracker:
 
     def __init__(self, config: TrackerConfig | None = None) -> None:
         self._config = config or TrackerConfig()
-        self._recent: deque[tuple[Cloud, Pose]] = deque(maxlen=self._config.memory)
+        self._recent: deque[tuple[Cloud, Pose]] = deque(maxlen=self._config.noisy_memory)
         self._keyframe_features: ScanFeatures | None = None
         self._map: LocalMap | None = None
         self._pose = Pose.identity()
@@ -97,6 +102,7 @@ class Tracker:
         self._odometry: Pose | None = None
         self._misses = 0
         self._noise = NoiseFigure()
+        self._wheels = Wheels()
 
     def __getstate__(self) -> dict[str, Any]:
         """The local map is a function of the recent keyframes: left out."""
@@ -105,7 +111,7 @@ class Tracker:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         if self._recent:
-            self._map = LocalMap.build(reversed(self._recent))
+            self._map = self._local_map()
 
     @property
     def turn_rate(self) -> float:
@@ -124,9 +130,13 @@ class Tracker:
             self._accept(Pose.identity(), stamp, odometry, moved_to=Pose.identity())
             self._add_keyframe(features, cloud)
             return Tracked("first", self._pose, True, np.zeros((3, 3)), 1.0, 0.0)
-        predictions = self._predict(stamp, odometry)
+        rolled = self._rolled(stamp, odometry)
+        trusted = rolled is not None and self._wheels.believed
+        predictions = self._predict(stamp, rolled if trusted else None)
         found, held = self._register(cloud, predictions, stamp - self._stamp)
-        if odometry is not None and self._odometry is not None:
+        if rolled is not None:
+            self._wheels.compare(rolled, self._pose.between(found.pose), self._unseen(found))
+        if trusted:
             found = held  # wheels know the way along a plain corridor
         conflict = self._conflict(features, found.pose)
         config = self._config
@@ -150,14 +160,26 @@ class Tracker:
             "tracked", found.pose, is_keyframe, information, found.fit, conflict, self._noise.value
         )
 
-    def _predict(self, stamp: float, odometry: Pose | None) -> list[Pose]:
+    def _rolled(self, stamp: float, odometry: Pose | None) -> Pose | None:
+        """The step that the wheels have made, None where they cannot have."""
+        if odometry is None or self._odometry is None:
+            return None
+        step = self._odometry.between(odometry)
+        return step if self._wheels.plausible(step, stamp - self._stamp) else None
+
+    def _unseen(self, found: Registration) -> float | None:
+        """Direction in the last pose's axes that a registration did not observe."""
+        along = _unobserved(found, self._config.least_isotropy)
+        return None if along is None else along - self._pose.theta
+
+    def _predict(self, stamp: float, rolled: Pose | None) -> list[Pose]:
         """Where the robot may be: same velocity, and what its wheels say."""
         dt = min(max(stamp - self._stamp, 0.0), self._config.longest_gap)
         # Where scans arrive in bursts, stamps lie: two steps at most, whatever the clock says.
         dt = min(dt, 2.0 * self._twist_span)
         predictions = [self._pose @ Pose.from_array(self._twist * dt)]
-        if odometry is not None and self._odometry is not None:
-            predictions.append(self._pose @ self._odometry.between(odometry))
+        if rolled is not None:
+            predictions.append(self._pose @ rolled)
         return predictions
 
     def _register(
@@ -205,7 +227,13 @@ class Tracker:
     def _add_keyframe(self, features: ScanFeatures, cloud: Cloud) -> None:
         self._recent.append((cloud, self._pose))
         self._keyframe_features = features
-        self._map = LocalMap.build(reversed(self._recent))
+        self._map = self._local_map()
+
+    def _local_map(self) -> LocalMap:
+        """The latest keyframes averaged; more of them where a noisy lidar makes each worth less."""
+        noisy = self._noise.value > self._config.noisy_above
+        memory = self._config.noisy_memory if noisy else self._config.memory
+        return LocalMap.build(islice(reversed(self._recent), memory))
 
 
 def _held_where_unseen(found: Registration, predicted: Pose, least: float) -> Registration:
@@ -213,16 +241,24 @@ def _held_where_unseen(found: Registration, predicted: Pose, least: float) -> Re
 
     Between two plain walls, noise alone would choose the slide, and momentum would keep it.
     """
-    seen = observe(found.information)
-    if seen.lambda_min >= least * seen.lambda_max:
+    along = _unobserved(found, least)
+    if along is None:
         return found
-    xx, xy, yy = seen.translation[0, 0], seen.translation[0, 1], seen.translation[1, 1]
-    along = 0.5 * math.atan2(2.0 * xy, xx - yy) + 0.5 * math.pi
     c, s = math.cos(along), math.sin(along)
     slide = c * (predicted.x - found.pose.x) + s * (predicted.y - found.pose.y)
     pose = Pose(found.pose.x + slide * c, found.pose.y + slide * s, found.pose.theta)
-    known = project_out_weak(found.information, weak_below=least * seen.lambda_max)
+    weak_below = least * observe(found.information).lambda_max
+    known = project_out_weak(found.information, weak_below=weak_below)
     return replace(found, pose=pose, information=known)
+
+
+def _unobserved(found: Registration, least: float) -> float | None:
+    """Direction in the map's axes [rad] along which nothing is observed, None if there is none."""
+    seen = observe(found.information)
+    if seen.lambda_min >= least * seen.lambda_max:
+        return None
+    xx, xy, yy = seen.translation[0, 0], seen.translation[0, 1], seen.translation[1, 1]
+    return 0.5 * math.atan2(2.0 * xy, xx - yy) + 0.5 * math.pi
 
 
 def _in_own_axes(found: Registration) -> NDArray[np.float64]:
