@@ -10,8 +10,8 @@ Steps of `Tracker.track`:
     then the track is lost and a new one begins without any link.
 
 Departs from the design's line tracker: registration against averaged points of the last
-keyframes drifts less (MIT CSAIL, no loops: rmse 0.14 m after 290 m) and needs no special case for
-scans without lines.
+keyframes needs no special case for scans without lines. Without loops MIT CSAIL comes out within
+0.2 to 0.6 m after 290 m; what loops leave of that is the graph's business.
 """
 
 from __future__ import annotations
