@@ -1,7 +1,8 @@
-"""A disk that is full or read-only: a clear answer, nothing half-taken."""
+"""A disk that is full, read-only or broken: a clear answer, nothing half-taken, others go on."""
 
 from __future__ import annotations
 
+import asyncio
 import os
 import sqlite3
 import subprocess
@@ -10,6 +11,9 @@ from pathlib import Path
 
 import numpy as np
 from lineloom_core.scan import Scan
+from lineloom_service.engine.conductor import Conductor
+from lineloom_service.engine.local_engine import LocalEngine
+from lineloom_service.settings import Settings
 from lineloom_service.store.codec import encode_scan
 from lineloom_service.store.records import NewScan, StoreError
 from lineloom_service.store.sql_store import SqlStore
@@ -103,3 +107,49 @@ async def test_a_read_only_directory_is_refused_with_its_name(tmp_path: Path) ->
     )
     assert done.returncode != 0
     assert f"StoreError: cannot use {data}: Permission denied" in done.stderr
+
+
+async def test_a_broken_page_stops_its_site_with_a_clear_word_and_no_other(
+    tmp_path: Path,
+) -> None:
+    store = _store(tmp_path)
+    await store.open()
+    for site in ("broken", "well"):
+        await _post(store, range(40), site=site, beams=800)
+    await store.close()
+    _break_a_page(tmp_path / "lineloom.db", "broken")
+    store = _store(tmp_path)
+    await store.open()
+    engine = LocalEngine(1, publish_every_s=0.05, mapper="fake_mapper:FakeMapper", warm_up=None)
+    settings = Settings(data_dir=tmp_path)
+    conductor = Conductor(store, engine, settings)
+    await conductor.start()
+    records = {record.name: record for record in await store.sites()}
+    for _ in range(1500):
+        well = conductor.published(records["well"].id)
+        if well.position == 40 and conductor.trouble(records["broken"].id):
+            break
+        await asyncio.sleep(0.02)
+    assert well.position == 40
+    assert conductor.trouble(records["well"].id) is None
+    assert "DatabaseError" in (conductor.trouble(records["broken"].id) or "")
+    assert not any("broken" in reason for reason in conductor.not_ready())
+    assert await _post(store, range(40, 50), site="well") == 10
+    await conductor.stop()
+    await store.close()
+
+
+def _break_a_page(file: Path, site: str) -> None:
+    """Overwrite a page that holds scans of one site only: an overflow page of its first entry."""
+    connection = sqlite3.connect(file)
+    connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    (body,) = connection.execute(
+        "SELECT body FROM entries JOIN sites ON sites.id = site_id WHERE name = ? AND seq = 3",
+        (site,),
+    ).fetchone()
+    connection.close()
+    data = bytearray(file.read_bytes())
+    start = data.index(body[1000:2000])  # in the first page that this entry alone runs over to
+    page = start // PAGE
+    data[page * PAGE : page * PAGE + 8] = b"\xff" * 8
+    file.write_bytes(data)

@@ -204,7 +204,9 @@ class SiteRunner:
     async def _idle(self) -> None:
         pause = None if self._done == self._saved else self._pace.snapshot_idle_s
         try:
-            await asyncio.wait_for(self._wake.wait(), pause)
+            # Not `wait_for`: that may lose a cancellation that comes together with the event.
+            async with asyncio.timeout(pause):
+                await self._wake.wait()
         except TimeoutError:
             await self.save()
         else:
