@@ -23,6 +23,7 @@ from tests.benchmarks.queries import queries
 from tests.benchmarks.row import Row, table
 from tests.benchmarks.scans import csail
 from tests.benchmarks.single_scans import extraction, matching
+from tests.benchmarks.sizes import growth
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 
@@ -35,6 +36,8 @@ def measure(data: Path, *, quick: bool, http: bool) -> list[Row]:
     rows = extraction(quick=quick)
     _tell("pairs of scans")
     rows += matching(data, quick=quick)
+    _tell("sizes of maps")
+    rows += growth(quick=quick)
     _tell("maps as files")
     rows += occupancy(quick=quick)
     if http:
