@@ -46,7 +46,7 @@ def _recognition(made: list[Place], size: int) -> Row:
         recognise(places[k], new[k % len(new)])
     brute = (process_time() - begin) / len(sample) * size
     return Row(
-        name=f"recognising a new place among {size}",
+        name=f"place, new among {size}",
         figure=1e3 * each,
         unit="ms",
         better="lower",
@@ -79,7 +79,7 @@ def _solving(size: int) -> Row:
     optimize(nodes, edges, anchors=(0,))
     cold = process_time() - begin
     return Row(
-        name=f"solving {size} keyframes after one more closure",
+        name=f"graph, {size} keyframes solved after one more closure",
         figure=1e3 * warm,
         unit="ms",
         better="lower",
