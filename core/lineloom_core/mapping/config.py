@@ -81,15 +81,17 @@ class DoubtConfig:
     most_compared: places that a new one is held against. most_missing: share of what stood still
     for one track and is missing for another, beyond the usual, over at least `least_compared` pairs
     of places and `least_points` points. most_strain [m], most_turn [rad]: how far the solved graph
-    may be from what a loop says.
+    may be from what a loop says. slip [m]: how far aside a place may be found again before it is
+    another one.
     """
 
     most_compared: int = 6
-    least_compared: int = 4
-    least_points: int = 1500
-    most_missing: float = 0.04
+    least_compared: int = 6
+    least_points: int = 2000
+    most_missing: float = 0.08
     most_strain: float = 0.5
     most_turn: float = 0.12
+    slip: float = 1.5
 
 
 @dataclass(frozen=True, slots=True)

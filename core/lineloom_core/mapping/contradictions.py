@@ -17,7 +17,7 @@ from lineloom_core.graph import tangent_errors
 from lineloom_core.mapping.constraint import Constraint
 from lineloom_core.mapping.overlap import count_steady_nearby, usual_missing
 from lineloom_core.mapping.site_map import SiteMap
-from lineloom_core.places import Place, missing_share
+from lineloom_core.places import Place, count_steady, missing_share
 
 TrackPair = tuple[str, str]
 
@@ -46,13 +46,26 @@ def _compare(site: SiteMap, place: Place) -> list[TrackPair]:
             break
         other = site.places[number]
         theirs = site.track(other.anchor).id
-        T = site.pose(other.anchor).between(here)
-        matched, missing = count_steady_nearby(other, place, T)
+        matched, missing = _held_against(site, other, place)
         pair = (min(own, theirs), max(own, theirs))
         before = site.overlaps.get(pair, (0, 0, 0))
         site.overlaps[pair] = (before[0] + matched, before[1] + missing, before[2] + 1)
         pairs[pair] = None
     return list(pairs)
+
+
+def _held_against(site: SiteMap, older: Place, newer: Place) -> tuple[int, int]:
+    """Steady points that both saw and that one missed, where the map puts the two places.
+
+    Where the newer place is recognised in the older one a little aside, tracking has slipped since
+    they met: that is no fault of the meeting.
+    """
+    T = site.pose(older.anchor).between(site.pose(newer.anchor))
+    found = site.memory.recognise(older, newer)
+    aside = found.T_reference_current
+    if found.plausible and aside is not None and aside.distance(T) < site.config.doubt.slip:
+        return count_steady(older, newer, aside)
+    return count_steady_nearby(older, newer, T)
 
 
 def _false_meeting(site: SiteMap, pair: TrackPair) -> tuple[Constraint, ...]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from lineloom_core.evaluation.merge_bench_buildings import building_classes
 from lineloom_core.evaluation.merge_bench_fleets import bench_fleet
 from lineloom_core.evaluation.merge_bench_judge import Judge
-from lineloom_core.mapping.config import JoinConfig, MapperConfig
+from lineloom_core.mapping.config import DoubtConfig, JoinConfig, MapperConfig
 from lineloom_core.mapping.site_mapper import SiteMapper
 
 from tests.core.mapping.drives import fingerprint
@@ -15,9 +15,11 @@ from tests.core.mapping.drives import fingerprint
 HASTY = MapperConfig(
     join=JoinConfig(
         doubted_points=0.0, most_missing=0.05, most_map_missing=1.0, least_distinctive=0
-    )
+    ),
+    doubt=DoubtConfig(most_missing=0.04, least_compared=4, least_points=1500),
 )
-"""Believes what any three matches say, as long as nothing speaks loudly against it."""
+"""Believes what any three matches say, as long as nothing speaks loudly against it, and is quick to
+think again."""
 
 
 def test_a_false_meeting_is_withdrawn_when_later_scans_contradict_it() -> None:
