@@ -81,7 +81,9 @@ class DoubtConfig:
     most_compared: places that a new one is held against. most_missing: share of what stood still
     for one track and is missing for another, beyond the usual, over at least `least_compared` pairs
     of places and `least_points` points. most_strain [m], most_turn [rad]: how far the solved graph
-    may be from what a loop says. slip [m]: how far aside a place may be found again before it is
+    may be from what a loop says. A place with at least `place_points` judged is right up to
+    `place_right` missing, and wrong from `place_wrong` on; `wrong_in_a_row` of them after a right
+    one mean that tracking slipped. slip [m]: how far aside a place may be found again before it is
     another one.
     """
 
@@ -91,6 +93,10 @@ class DoubtConfig:
     most_missing: float = 0.08
     most_strain: float = 0.5
     most_turn: float = 0.12
+    place_points: int = 600
+    place_right: float = 0.03
+    place_wrong: float = 0.1
+    wrong_in_a_row: int = 2
     slip: float = 1.5
 
 

@@ -1,9 +1,10 @@
 """Second thoughts: what a new place shows to be wrong about what was believed.
 
 Steps of `contradicted_by`: 1. hold the new place against those of other tracks that the map puts
-around it, and add up what is missing; 2. where too much of what stood still is missing between two
-tracks, the meeting that they rest on was false: name its whole set; 3. name loops that the solved
-graph does not bear out. What is named is withdrawn, and the history gone through without it.
+around it, and add up what is missing; 2. where a track was right and then is wrong, tracking has
+slipped: name the step; 3. where too much of what stood still is missing between two tracks, the
+meeting that they rest on was false: name its whole set; 4. name loops that the solved graph does
+not bear out. What is named is withdrawn, and the history gone through without it.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import networkx as nx
 import numpy as np
 
 from lineloom_core.graph import tangent_errors
-from lineloom_core.mapping.constraint import Constraint
+from lineloom_core.mapping.constraint import Constraint, step_id
 from lineloom_core.mapping.overlap import count_steady_nearby, usual_missing
 from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.places import Place, count_steady, missing_share
@@ -24,15 +25,19 @@ TrackPair = tuple[str, str]
 
 def contradicted_by(site: SiteMap, place: Place) -> tuple[Constraint, ...]:
     """Accepted constraints that are not to be believed any more, given the new place."""
-    for pair in _compare(site, place):
+    counts = _compare(site, place)
+    slipped = _slip(site, place, counts)
+    if slipped is not None:
+        return (slipped,)
+    for pair in counts:
         false = _false_meeting(site, pair)
         if false:
             return false
     return _strained(site, place)
 
 
-def _compare(site: SiteMap, place: Place) -> list[TrackPair]:
-    """Step 1; return the pairs of tracks that there is news of."""
+def _compare(site: SiteMap, place: Place) -> dict[TrackPair, tuple[int, int]]:
+    """Step 1; return what this place adds, by pair of tracks."""
     here = site.pose(place.anchor)
     own = site.track(place.anchor).id
     near = sorted(
@@ -40,7 +45,7 @@ def _compare(site: SiteMap, place: Place) -> list[TrackPair]:
         for other in site.places.values()
         if site.track(other.anchor).id != own and site.same_component(other.anchor, place.anchor)
     )
-    pairs: dict[TrackPair, None] = {}
+    news: dict[TrackPair, tuple[int, int]] = {}
     for distance, number in near[: site.config.doubt.most_compared]:
         if distance > site.config.places.span:
             break
@@ -50,8 +55,42 @@ def _compare(site: SiteMap, place: Place) -> list[TrackPair]:
         pair = (min(own, theirs), max(own, theirs))
         before = site.overlaps.get(pair, (0, 0, 0))
         site.overlaps[pair] = (before[0] + matched, before[1] + missing, before[2] + 1)
-        pairs[pair] = None
-    return list(pairs)
+        so_far = news.get(pair, (0, 0))
+        news[pair] = (so_far[0] + matched, so_far[1] + missing)
+    return news
+
+
+def _slip(
+    site: SiteMap, place: Place, counts: dict[TrackPair, tuple[int, int]]
+) -> Constraint | None:
+    """Step 2: the step at which tracking slipped, if the place is off where it was right before.
+
+    A meeting that was false was never right; a robot that agreed with the others' maps and then
+    does not, two places running, has slipped in between: where its steps knew least.
+    """
+    config = site.config.doubt
+    matched, missing = (sum(c[i] for c in counts.values()) for i in (0, 1))
+    if matched + missing < config.place_points:
+        return None
+    track, share = site.track(place.anchor), missing_share(matched, missing)
+    if share <= config.place_right:
+        track.right_until, track.wrong_since = place.id, 0
+        return None
+    if share < config.place_wrong or track.right_until is None:
+        return None
+    track.wrong_since += 1
+    if track.wrong_since < config.wrong_in_a_row:
+        return None
+    steps = [
+        site.constraints[step_id(k)]
+        for k in track.keyframes
+        if track.right_until < k <= place.id and step_id(k) not in site.verdicts.approved
+    ]
+    if not steps:
+        return None
+    weakest = min(steps, key=lambda c: float(np.linalg.eigvalsh(c.information[:2, :2])[0]))
+    reason = f"withdrawn: tracking slipped hereabouts, {share:.1%} of what stood still is missing"
+    return weakest.moved_to("retracted", reason, site.now)
 
 
 def _held_against(site: SiteMap, older: Place, newer: Place) -> tuple[int, int]:
@@ -69,7 +108,7 @@ def _held_against(site: SiteMap, older: Place, newer: Place) -> tuple[int, int]:
 
 
 def _false_meeting(site: SiteMap, pair: TrackPair) -> tuple[Constraint, ...]:
-    """Step 2: the weakest meeting between two tracks, if their maps contradict each other."""
+    """Step 3: the weakest meeting between two tracks, if their maps contradict each other."""
     config = site.config.doubt
     matched, missing, compared = site.overlaps[pair]
     if compared < config.least_compared or matched + missing < config.least_points:
@@ -108,7 +147,7 @@ def _weakest_meeting(site: SiteMap, track_a: str, track_b: str) -> list[Constrai
 
 
 def _strained(site: SiteMap, place: Place) -> tuple[Constraint, ...]:
-    """Step 3: accepted loops that the graph has solved far away from what they say."""
+    """Step 4: accepted loops that the graph has solved far away from what they say."""
     root = site.component_root(place.anchor)
     loops = [
         c

@@ -28,6 +28,10 @@ class Track:
     """Distance driven up to each keyframe [m]."""
     last_place_at: float = 0.0
     """Distance driven when the last place was made [m]."""
+    right_until: int | None = None
+    """The last place that agreed with other tracks' maps."""
+    wrong_since: int = 0
+    """Places in a row that did not."""
     chain: Chain = field(default_factory=Chain)
     """How its error grew."""
 

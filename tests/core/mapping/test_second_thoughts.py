@@ -7,10 +7,15 @@ from dataclasses import replace
 from lineloom_core.evaluation.merge_bench_buildings import building_classes
 from lineloom_core.evaluation.merge_bench_fleets import bench_fleet
 from lineloom_core.evaluation.merge_bench_judge import Judge
+from lineloom_core.geometry import Pose
 from lineloom_core.mapping.config import DoubtConfig, JoinConfig, MapperConfig
+from lineloom_core.mapping.contradictions import contradicted_by
+from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.mapping.site_mapper import SiteMapper
+from lineloom_core.simulation import SimulatedRobot, rooms, sick_lms200
 
 from tests.core.mapping.drives import fingerprint
+from tests.core.mapping.sites import lay_places, lay_track, link, thinned
 
 HASTY = MapperConfig(
     join=JoinConfig(
@@ -59,3 +64,31 @@ def test_a_false_meeting_is_withdrawn_when_later_scans_contradict_it() -> None:
     mapper.reinstate(first)
     assert first not in mapper.verdicts.withdrawn
     assert first in mapper.verdicts.approved
+
+
+def test_a_slip_of_tracking_is_blamed_on_the_step_and_not_on_the_meeting() -> None:
+    robot = SimulatedRobot.wandering("a", rooms(2), lidar=sick_lms200(), seed=3, duration_s=60.0)
+    first, second = (thinned(list(r.scans())) for r in (robot, replace(robot, name="b", seed=77)))
+    site = SiteMap(MapperConfig())
+    a = lay_track(site, first, robot="a")
+    true = [second[0].true_pose.between(s.true_pose) for s in second]
+    half = len(true) // 2
+    slipped = true[:half] + [Pose(2.5, 0.0, 0.0) @ pose for pose in true[half:]]
+    b = lay_track(site, second, slipped, robot="b")
+    T_a_b = first[4].true_pose.between(second[4].true_pose)
+    link(site, a[4], b[4], T_a_b, state="accepted")
+    site.optimise(a[0])
+    lay_places(site, a)
+    named = None
+    for begin in range(0, len(b) - 8 + 1, 4):
+        place = site.add_place(tuple(b[begin : begin + 8]))
+        found = contradicted_by(site, place)
+        if begin + 8 <= half:
+            assert found == (), "nothing is wrong yet"
+        elif found:
+            named = found
+            break
+    assert named is not None
+    assert [c.kind for c in named] == ["sequential"]
+    assert b[half - 8] <= named[0].keyframe_a <= b[half + 12]
+    assert named[0].reason.startswith("withdrawn: tracking slipped")
