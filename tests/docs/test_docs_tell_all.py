@@ -139,3 +139,17 @@ def test_every_reason_to_wait(module: str, function: str) -> None:
     assert len(reasons) >= 3, "the search for reasons is broken"
     page = " ".join((ROOT / "core" / "docs" / "concepts.md").read_text(encoding="utf-8").split())
     assert [reason for reason in reasons if reason.strip() not in page] == []
+
+
+def test_every_reason_to_withdraw() -> None:
+    source = (CORE / "mapping" / "contradictions.py").read_text(encoding="utf-8")
+    reasons = {
+        node.value.rstrip(" ,")
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.Constant)
+        and isinstance(node.value, str)
+        and node.value.startswith("withdrawn:")
+    }
+    assert len(reasons) >= 3, "the search for reasons is broken"
+    page = " ".join((ROOT / "core" / "docs" / "concepts.md").read_text(encoding="utf-8").split())
+    assert sorted(reason for reason in reasons if reason not in page) == []
