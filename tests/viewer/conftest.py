@@ -45,6 +45,7 @@ class Console:
 
     def __init__(self) -> None:
         self.errors: list[str] = []
+        self._expected: list[str] = []
 
     def listen(self, page: Page) -> None:
         """Note uncaught exceptions and errors in the console."""
@@ -52,11 +53,12 @@ class Console:
         page.on("console", self._note)
 
     def _note(self, message: ConsoleMessage) -> None:
-        if message.type == "error":
+        if message.type == "error" and all(part not in message.text for part in self._expected):
             self.errors.append(message.text)
 
     def expect(self, part: str) -> None:
-        """Take out complaints with these words."""
+        """Take out complaints with these words, those included that are still on their way."""
+        self._expected.append(part)
         self.errors = [error for error in self.errors if part not in error]
 
 
