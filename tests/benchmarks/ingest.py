@@ -6,8 +6,6 @@ import asyncio
 import json
 import os
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +14,7 @@ import numpy as np
 import uvloop
 from lineloom.cli.child_service import ChildService
 
+from tests.benchmarks.environment import environment
 from tests.benchmarks.post_load import Load, post_all, request
 from tests.benchmarks.row import Row
 
@@ -63,7 +62,7 @@ class _Service:
         """Return acknowledged scans a second, and the server's CPU time a scan [µs]."""
         with (
             tempfile.TemporaryDirectory(prefix="lineloom-bench-") as folder,
-            _environment(self._settings),
+            environment(self._settings),
             ChildService(Path(folder)) as service,
         ):
             service.wait_until_ready()
@@ -131,17 +130,6 @@ def _scan(ranges: np.ndarray[Any, np.dtype[np.float32]], seq: int, kind: str) ->
         # Centimetres, as drivers print them.
         "ranges": ranges.tobytes() if kind == MSGPACK else [round(float(r), 3) for r in ranges],
     }
-
-
-@contextmanager
-def _environment(values: dict[str, str]) -> Iterator[None]:
-    before = dict(os.environ)
-    os.environ.update(values)
-    try:
-        yield
-    finally:
-        os.environ.clear()
-        os.environ.update(before)
 
 
 def _cpu_seconds(pid: int) -> float:

@@ -20,10 +20,12 @@ from tests.benchmarks.drives import driving
 from tests.benchmarks.ingest import ingesting
 from tests.benchmarks.map_files import occupancy
 from tests.benchmarks.queries import queries
+from tests.benchmarks.restart import restarting
 from tests.benchmarks.row import Row, table
 from tests.benchmarks.scans import csail
 from tests.benchmarks.single_scans import extraction, matching
 from tests.benchmarks.sizes import growth
+from tests.benchmarks.soak import QUICK_SHARE, SHARE, soaking
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 
@@ -43,6 +45,10 @@ def measure(data: Path, *, quick: bool, http: bool) -> list[Row]:
     if http:
         _tell("ingest")
         rows += ingesting(quick=quick)
+        _tell("restart")
+        rows += restarting(quick=quick)
+        _tell("soak")
+        rows += soaking(QUICK_SHARE if quick else SHARE)
     if not (data / "mit-csail").is_dir():
         _tell(f"no drives and no real pairs: {data} is missing")
         return rows

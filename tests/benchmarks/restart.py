@@ -1,0 +1,90 @@
+"""`python -m tests.benchmarks.restart`: how long a killed service is away.
+
+From the start of the process until it takes scans and shows the site's map as it was, once from the
+snapshot and once, as the baseline, from the log alone.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import tempfile
+import time
+from itertools import islice
+from pathlib import Path
+
+from lineloom import Client
+from lineloom.cli.child_service import ChildService
+from lineloom_core.simulation import Fleet, sick_lms200
+
+from tests.benchmarks.environment import environment
+from tests.benchmarks.row import Row, table
+from tests.benchmarks.saved_sites import drop_snapshots, saved_bytes
+
+SITE = "restarted"
+ROBOTS = 4
+_SETTINGS = {"LINELOOM_SNAPSHOT_IDLE_S": "0.5"}
+_POLL_S = 0.02
+
+
+def restarting(*, quick: bool) -> list[Row]:
+    """A site of 5,000 scans after SIGKILL, with its snapshot and without."""
+    count = 300 if quick else 5000
+    with tempfile.TemporaryDirectory(prefix="lineloom-bench-") as name, environment(_SETTINGS):
+        service = ChildService(Path(name))
+        with service:
+            version = _map(service, count)
+            saved_bytes(service.data_dir)
+            _kill(service)
+        restored = _seconds_away(service, version)
+        drop_snapshots(service.data_dir)
+        replayed = _seconds_away(service, version)
+    return [
+        Row(
+            name=f"restart after SIGKILL, a site of {count} scans, until its map is there",
+            figure=restored,
+            unit="s",
+            better="lower",
+            goal=10.0,
+            baseline="from the log, without snapshots",
+            baseline_figure=replayed,
+            note="wall clock; kernels cached",
+        )
+    ]
+
+
+def _map(service: ChildService, count: int) -> int:
+    """Post the drives of some robots; the version of the map that they made."""
+    lidar = sick_lms200()
+    duration_s = 1.05 * count / (ROBOTS * lidar.rate_hz)
+    fleet = Fleet.office(seed=4, robots=ROBOTS, duration_s=duration_s, lidar=lidar)
+    seen = list(islice(fleet.scans(), count))
+    assert len(seen) == count
+    service.wait_until_ready()
+    with Client(service.url) as client:
+        for robot in fleet.robots:
+            own = [one.scan for one in seen if one.robot == robot.name]
+            client.post_scans(SITE, robot.name, own, batch=200)
+        return client.wait_until_idle(SITE).version
+
+
+def _kill(service: ChildService) -> None:
+    assert service.pid is not None
+    os.killpg(service.pid, signal.SIGKILL)  # its workers as well
+
+
+def _seconds_away(service: ChildService, version: int) -> float:
+    """Start, wait until all is as before, kill."""
+    begin = time.perf_counter()
+    with service:
+        service.wait_until_ready(600.0)
+        with Client(service.url) as client:
+            while client.map(SITE).version < version:
+                time.sleep(_POLL_S)
+        seconds = time.perf_counter() - begin
+        _kill(service)
+    return seconds
+
+
+if __name__ == "__main__":
+    print(table(restarting(quick=False)))

@@ -1,0 +1,145 @@
+"""`python -m tests.benchmarks.soak [--share S | --full]`: does memory stay bounded under load?
+
+An hour of 20 robots, or the share of it that is named, sent as fast as the service takes it: the
+backlog is full most of the time. Listeners to events that never read hang on it meanwhile. Memory
+is compared with the map, which is what it may grow with.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections import defaultdict
+from collections.abc import Iterator
+from itertools import islice, pairwise
+from pathlib import Path
+
+from lineloom import Client
+from lineloom.cli.child_service import ChildService
+from lineloom.retry import RetryPolicy
+from lineloom_core.scan import Scan
+from lineloom_core.simulation import Fleet, sick_lms200
+
+from tests.benchmarks.environment import environment
+from tests.benchmarks.row import Row, table
+from tests.benchmarks.saved_sites import saved_bytes
+from tests.benchmarks.soak_watch import Moment, SlowReaders, Watch, look
+
+SITE = "soaked"
+ROBOTS = 20
+HOUR_S = 3600.0
+SHARE, QUICK_SHARE = 0.05, 0.005
+_SETTINGS = {
+    "LINELOOM_BACKLOG_LIMIT": "2000",
+    "LINELOOM_SLOW_READER_S": "5",
+    "LINELOOM_SNAPSHOT_IDLE_S": "0.5",
+}
+_READERS = 8
+_PAGE_BYTES = 4096
+_SECONDS_A_POST = 2
+_PATIENT = RetryPolicy(attempts=1000, max_delay=1.0, seed=1)
+
+Posts = Iterator[tuple[str, list[Scan]]]
+
+
+def soaking(share: float) -> list[Row]:
+    """What each process grew by beside the map; a report of all that was seen goes to stderr."""
+    fleet = Fleet.office(seed=4, robots=ROBOTS, duration_s=share * HOUR_S, lidar=sick_lms200())
+    posts = _posts(fleet)
+    half = int(share * HOUR_S / _SECONDS_A_POST) * ROBOTS // 2
+    with (
+        tempfile.TemporaryDirectory(prefix="lineloom-bench-") as name,
+        environment(_SETTINGS),
+        ChildService(Path(name)) as service,
+        Client(service.url, retry=_PATIENT) as client,
+    ):
+        service.wait_until_ready()
+        assert service.pid is not None
+        moments = [look("start", service.pid, 0)]
+        _send(client, islice(posts, ROBOTS))
+        with SlowReaders(service.port, SITE, _READERS), Watch(service.url, SITE) as watch:
+            for when, part in (("middle", islice(posts, half - ROBOTS)), ("end", posts)):
+                _send(client, part)
+                client.wait_until_idle(SITE, timeout=7200.0)
+                moments.append(look(when, service.pid, saved_bytes(service.data_dir)))
+            dropped = _READERS - watch.listeners()
+            refused = watch.refused()
+    report = _report(moments, watch.highest_backlog, refused, dropped)
+    print(report, file=sys.stderr)  # stdout is for the rows
+    return _rows(moments, f"backlog to {watch.highest_backlog}, {refused} refused")
+
+
+def _posts(fleet: Fleet) -> Posts:
+    """What each robot saw in some seconds, in the order of time; simulated only when asked for."""
+    window: dict[str, list[Scan]] = defaultdict(list)
+    end_s = float(_SECONDS_A_POST)
+    for seen in fleet.scans():
+        if seen.time_s >= end_s:
+            yield from window.items()
+            window.clear()
+            end_s += _SECONDS_A_POST
+        window[seen.robot].append(seen.scan)
+    yield from window.items()
+
+
+def _send(client: Client, posts: Posts) -> None:
+    for robot, scans in posts:
+        client.post_scans(SITE, robot, scans)
+
+
+def _report(moments: list[Moment], backlog: int, refused: int, dropped: int) -> str:
+    lines = [f"{'MB':8}" + "".join(f"{moment.when:>10}" for moment in moments)]
+    lines.append(f"{'map':8}" + "".join(f"{m.map_bytes / 1e6:10.1f}" for m in moments))
+    for process in moments[0].rss_bytes:
+        figures = (f"{m.rss_bytes[process] / 1e6:10.1f}" for m in moments)
+        lines.append(f"{process:8}" + "".join(figures))
+    added = _growth(*moments[-2:])
+    for process, grown in added.items():
+        verdict = "more than" if grown > added["map"] else "no more than"
+        if process != "map":
+            lines.append(f"from the middle {process} grew by {grown / 1e6:.1f}, {verdict} the map")
+    lines.append(f"backlog at most {backlog}, POSTs refused {refused} (sent again)")
+    lines.append(f"listeners that never read: {dropped} of {_READERS} dropped")
+    return "\n".join(lines)
+
+
+def _rows(moments: list[Moment], note: str) -> list[Row]:
+    """The goal: a MB of map costs no more in the second half than in the first, its start-up's."""
+    first, second = (_growth(*pair) for pair in pairwise(moments))
+    rows = []
+    for process in moments[0].rss_bytes:
+        before, after = (added[process] / added["map"] for added in (first, second))
+        rows.append(
+            Row(
+                name=f"soak, {ROBOTS} robots: memory of {process} for a MB of map, second half",
+                figure=after,
+                unit="MB",
+                better="lower",
+                goal=before,
+                baseline="first half",
+                baseline_figure=before,
+                note=note,
+            )
+        )
+    return rows
+
+
+def _growth(before: Moment, after: Moment) -> dict[str, int]:
+    """By how much the map and each process grew [bytes], a page at least: it is divided by."""
+    added = {name: rss - before.rss_bytes[name] for name, rss in after.rss_bytes.items()}
+    added["map"] = after.map_bytes - before.map_bytes
+    return {name: max(size, _PAGE_BYTES) for name, size in added.items()}
+
+
+def main() -> None:
+    """Soak and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--share", type=float, default=SHARE, help="of the hour, up to 1")
+    parser.add_argument("--full", action="store_true", help="the whole hour")
+    options = parser.parse_args()
+    print(table(soaking(1.0 if options.full else options.share)))
+
+
+if __name__ == "__main__":
+    main()

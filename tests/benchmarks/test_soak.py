@@ -1,0 +1,31 @@
+"""What the soak calls growth, and that a service which leaks is seen."""
+
+from __future__ import annotations
+
+from tests.benchmarks.soak import _rows
+from tests.benchmarks.soak_watch import Moment
+
+MB = 1_000_000
+
+
+def _moments(*api: int) -> list[Moment]:
+    maps = (0, 10, 15)
+    return [
+        Moment(when, size * MB, {"API": rss * MB})
+        for when, size, rss in zip(("start", "middle", "end"), maps, api, strict=True)
+    ]
+
+
+def test_memory_may_grow_as_the_map_does() -> None:
+    (row,) = _rows(_moments(100, 120, 130), "")
+    assert (row.figure, row.goal, row.reached) == (2.0, 2.0, True)
+
+
+def test_memory_that_grows_while_the_map_hardly_does_misses_the_goal() -> None:
+    (row,) = _rows(_moments(100, 120, 140), "")
+    assert row.reached is False
+
+
+def test_memory_that_shrinks_is_fine() -> None:
+    (row,) = _rows(_moments(100, 120, 110), "")
+    assert row.reached is True
