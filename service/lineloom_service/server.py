@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import signal
 import socket
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
 
 import uvicorn
 import uvloop
@@ -26,18 +30,18 @@ def run(settings: Settings) -> None:
     log.configure(settings.log_level, settings.log_format)
     try:
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-            runner.run(_serve(settings))
+            runner.run(serve(Service(settings)))
     except (StoreError, UnprotectedError) as error:
         sys.exit(f"lineloom: {error}")
     except KeyboardInterrupt:
-        # uvicorn raises the signal again once it has stopped in good order.
-        pass
+        pass  # while starting, or a second time while stopping
 
 
-async def _serve(settings: Settings) -> None:
-    service = Service(settings)
+async def serve(service: Service) -> None:
+    """Serve until SIGINT or SIGTERM, then save what was mapped."""
     await service.start()
     freezing = asyncio.create_task(_freeze_when_ready(service))
+    settings = service.settings
     try:
         config = uvicorn.Config(
             create_app(service=service),
@@ -53,10 +57,30 @@ async def _serve(settings: Settings) -> None:
         )
         listening = config.bind_socket()
         _drop_the_deaf(listening, settings.slow_reader_s)
-        await uvicorn.Server(config).serve(sockets=[listening])
+        with _signals_end_only_the_serving():
+            await uvicorn.Server(config).serve(sockets=[listening])
     finally:
         freezing.cancel()
         await service.stop()
+
+
+@contextmanager
+def _signals_end_only_the_serving() -> Iterator[None]:
+    """Have the signal that ended uvicorn end nothing else.
+
+    Uvicorn raises it again once it has stopped, for whoever handled it before: by default that
+    ends the process, or cancels the task, before anything is saved.
+    """
+    before = {sig: signal.signal(sig, _ignore) for sig in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for sig, handler in before.items():
+            signal.signal(sig, handler)
+
+
+def _ignore(_signal: int, _frame: FrameType | None) -> None:
+    """Not SIG_IGN, which child processes would inherit."""
 
 
 async def _freeze_when_ready(service: Service) -> None:

@@ -7,10 +7,10 @@ import os
 import sys
 from pathlib import Path
 
-import uvicorn
 import uvloop
-from lineloom_service.app import create_app
 from lineloom_service.engine.local_engine import LocalEngine
+from lineloom_service.observation import log
+from lineloom_service.server import serve
 from lineloom_service.service import Service
 from lineloom_service.settings import Settings
 
@@ -19,15 +19,8 @@ async def _serve(directory: Path, port: int) -> None:
     settings = Settings(data_dir=directory, gap_window_s=0.2, snapshot_every=100, port=port)
     mapper = os.environ.get("SERVER_MAPPER", "fake_mapper:FakeMapper")
     engine = LocalEngine(1, publish_every_s=0.1, mapper=mapper, warm_up=None)
-    service = Service(settings, engine=engine)
-    await service.start()
-    try:
-        config = uvicorn.Config(
-            create_app(service=service), port=port, log_level="warning", proxy_headers=False
-        )
-        await uvicorn.Server(config).serve()
-    finally:
-        await service.stop()
+    log.configure("warning", "text")
+    await serve(Service(settings, engine=engine))
 
 
 if __name__ == "__main__":

@@ -135,9 +135,18 @@ class Conductor:
         unseen = [f"the view of site {site} is being loaded" for site in self._views.waiting()]
         if self._was_standby or not self._mapping:
             return unseen  # taking over, it goes on answering
-        restoring = [r.name for r in self._runners.values() if not r.restored.is_set()]
-        reasons = [f"site {name} is being restored" for name in restoring]
+        reasons = [
+            f"site {runner.name} is being restored: entry {runner.done} of {runner.expected}"
+            for runner in self._runners.values()
+            if self._is_restoring(runner)
+        ]
         return self._engine.not_ready() + reasons + unseen
+
+    def _is_restoring(self, runner: SiteRunner) -> bool:
+        # One site in trouble does not keep the others from being served.
+        if runner.new or runner.trouble is not None:
+            return False
+        return runner.published is None or self.published(runner.site).position < runner.expected
 
     async def _first_claim(self) -> Claim | None:
         try:
@@ -199,7 +208,7 @@ class Conductor:
         if self._recorder is not None:
             self._recorder.forget_site(site_id)
 
-    def _runner(self, record: SiteRecord) -> SiteRunner:
+    def _runner(self, record: SiteRecord, *, new: bool = False) -> SiteRunner:
         runner = SiteRunner(
             record,
             self._store,
@@ -207,6 +216,7 @@ class Conductor:
             self._pace,
             lineloom_core.__version__,
             self._recorder,
+            new=new,
         )
         self._runners[record.id] = runner
         task = asyncio.create_task(runner.run(), name=f"site-{record.name}")
@@ -223,7 +233,7 @@ class Conductor:
             runner.on_commit(record)
         elif self._mapping:
             # New: nothing to restore, so it does not keep the service from being ready.
-            self._runner(record).restored.set()
+            self._runner(record, new=True)
 
     def _on_news(self, kind: NewsKind, key: str) -> None:
         if kind == "view" and not self._mapping:

@@ -57,12 +57,17 @@ class SiteRunner:
         pace: Pace,
         producer: str,
         recorder: Recorder | None = None,
+        *,
+        new: bool = False,
     ) -> None:
+        self.new = new
+        """Nothing of it was ever answered, so there is nothing to restore."""
         self.site = record.id
         self.name = record.name
         self.skips: dict[int, Skip] = {}
         self.published: Published | None = None
-        self.restored = asyncio.Event()
+        self.expected = 0
+        """Only a view at this position, or later, answers as was answered before the start."""
         self.trouble: str | None = None
         """Why the site is not mapped just now."""
         self._end = record.position
@@ -91,7 +96,6 @@ class SiteRunner:
 
     def on_view(self, position: int, view: SiteView) -> None:
         """Take what the worker published; a replay does not take queries back in time."""
-        self.restored.set()
         if self.published is not None and position < self.published.position:
             return
         scans = self._marks.get(position, self._scans_done)
@@ -120,7 +124,6 @@ class SiteRunner:
                 if self.trouble is None:
                     _LOG.exception("site %s: its log cannot be read, trying again", self.name)
                 self.trouble = f"its log cannot be read: {error}"
-                self.restored.set()  # one broken site does not keep the others from being served
                 await asyncio.sleep(_AGAIN_S)
 
     async def save(self) -> None:
@@ -150,6 +153,8 @@ class SiteRunner:
         self._saved = 0 if snapshot is None else snapshot.position
         self._scans_sent = self._scans_done = 0 if snapshot is None else snapshot.scans
         self._sent = self._done = self._saved
+        # What was answered from is recorded or saved, the later of the two; the log has it all.
+        self.expected = min(self._end, max(self.expected, self._recorded, self._saved))
         self._marks = {self._done: self._scans_done}
         self._under_way.clear()
         await self._engine.start_site(
@@ -202,6 +207,8 @@ class SiteRunner:
             await self._await_one()
 
     async def _idle(self) -> None:
+        if self._done == self._saved:
+            self.trouble = None  # nothing is left to read or to save
         pause = None if self._done == self._saved else self._pace.snapshot_idle_s
         try:
             # Not `wait_for`: that may lose a cancellation that comes together with the event.
@@ -238,6 +245,7 @@ class SiteRunner:
         """Go back to the snapshot before, or to the log."""
         if self._saved == 0:
             _LOG.error("site %s: the mapper does not start: %s", self.name, reason)
+            self.trouble = f"its mapper does not start: {reason}"
             await asyncio.sleep(5.0)
             return
         _LOG.error("site %s: snapshot %d is unreadable: %s", self.name, self._saved, reason)

@@ -259,8 +259,10 @@ def run_worker(
     pipe, life, current: file descriptors of the pipe to the service, of one that the service
     holds open as long as it lives, and of the shared CurrentEntry.
     """
-    # A Ctrl-C goes to the whole terminal group; the service decides when its workers end.
+    # A Ctrl-C goes to the whole terminal group, and systemd's SIGTERM to all processes of a unit.
+    # The service decides when its workers end: it has their maps saved first.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
     threading.Thread(target=_end_with_service, args=(life,), daemon=True).start()
     with contextlib.suppress(OSError):
         os.nice(_NICENESS)  # answers go before mapping

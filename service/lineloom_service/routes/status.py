@@ -25,7 +25,7 @@ async def healthz() -> Response:
 
 @router.get("/readyz", response_model=wire.Readiness)
 async def readyz(service: ServiceDep) -> Response:
-    """Workers are warm and all sites restored; 503 says what is missing."""
+    """Workers are warm, and every site's map is as far as before; 503 says what is not."""
     reasons = service.not_ready()
     if not reasons:
         return answer(wire.Readiness(ready=True, reasons=[]))

@@ -1,0 +1,121 @@
+"""After a restart the service is ready when it answers as it did before, and not earlier."""
+
+from __future__ import annotations
+
+import sqlite3
+import subprocess
+import time
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from lineloom import Client
+
+from tests.service.fake_server import free_port, server
+
+SNAPSHOT_EVERY = 100
+"""As `serve_fake.py` has it."""
+
+SLOW = {"FAKE_MAPPER_SECONDS": "0.01"}
+
+
+def _scans(seqs: range) -> list[dict[str, Any]]:
+    return [
+        {
+            "seq": seq,
+            "stamp": float(seq),
+            "angle_min": -1.0,
+            "angle_increment": 0.5,
+            "range_min": 0.1,
+            "range_max": 30.0,
+            "ranges": [1.0, 2.0, 3.0, 4.0, 5.0],
+        }
+        for seq in seqs
+    ]
+
+
+def _saved(directory: Path) -> int:
+    """Return the position of the site's latest snapshot."""
+    with closing(sqlite3.connect(directory / "lineloom.db")) as connection:
+        (position,) = connection.execute("SELECT max(position) FROM snapshots").fetchone()
+    return position or 0
+
+
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    process.kill()
+    process.wait()
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.terminate()
+    assert process.wait(20) == 0
+
+
+def _end_all(process: subprocess.Popen[bytes]) -> None:
+    """As systemd does: SIGTERM to every process of the unit."""
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    assert children
+    for child in children:
+        subprocess.run(["kill", "-TERM", child], check=True)
+    time.sleep(0.2)  # the worst order: the workers first
+    _end(process)
+
+
+@pytest.mark.parametrize(
+    ("scans", "stop", "saved"),
+    [
+        pytest.param(80, _kill, 0, id="killed-before-the-first-snapshot"),
+        pytest.param(130, _kill, 100, id="killed-with-some-not-saved"),
+        pytest.param(80, _end, 80, id="ended"),
+        pytest.param(80, _end_all, 80, id="ended-with-its-workers"),
+    ],
+)
+def test_ready_is_said_with_the_map_of_before(
+    tmp_path: Path, scans: int, stop: Callable[[subprocess.Popen[bytes]], None], saved: int
+) -> None:
+    port = free_port()
+    with Client(f"http://127.0.0.1:{port}") as client:
+        with server(tmp_path, port) as process:
+            for start in range(0, scans, SNAPSHOT_EVERY):
+                client.post_scans("s", "r", _scans(range(start, min(scans, start + 100))))
+                before = client.wait_until_idle("s")
+                _until(lambda end=start + 100: end > scans or _saved(tmp_path) == end)  # type: ignore[misc]
+            _until(lambda: _recorded(tmp_path) == scans)
+            stop(process)
+        assert _saved(tmp_path) == saved
+        with server(tmp_path, port, **SLOW):
+            reasons = _reasons_until_ready(port)
+            after = client.site("s")
+    assert (after.version, after.scans.processed) == (before.version, scans)
+    assert after.idle
+    if saved < scans:
+        assert any(f"site s is being restored: entry {saved} of {scans}" in r for r in reasons)
+
+
+def _recorded(directory: Path) -> int:
+    with closing(sqlite3.connect(directory / "lineloom.db")) as connection:
+        (position,) = connection.execute("SELECT max(position) FROM events").fetchone()
+    return position or 0
+
+
+def _until(done: Callable[[], bool]) -> None:
+    for _ in range(500):
+        if done():
+            return
+        time.sleep(0.02)
+    raise AssertionError("never happened")
+
+
+def _reasons_until_ready(port: int) -> set[str]:
+    reasons: set[str] = set()
+    for _ in range(3000):
+        answer = httpx.get(f"http://127.0.0.1:{port}/readyz")
+        if answer.status_code == 200:
+            return reasons
+        assert answer.status_code == 503
+        reasons.update(answer.json()["reasons"])
+        time.sleep(0.005)
+    raise AssertionError(f"never ready: {reasons}")
