@@ -136,7 +136,12 @@ class Conductor:
         if self._was_standby or not self._mapping:
             return unseen  # taking over, it goes on answering
         reasons = [
-            f"site {runner.name} is being restored: entry {runner.done} of {runner.expected}"
+            f"site {runner.name} is being restored"
+            + (
+                f": entry {runner.done} of {runner.expected}"
+                if runner.done < runner.expected
+                else ""
+            )
             for runner in self._runners.values()
             if self._is_restoring(runner)
         ]
