@@ -48,8 +48,8 @@ def to_mount(mount: wire.MountSettings) -> Mount:
     return Mount(Pose(mount.x, mount.y, mount.theta), mount.inverted)
 
 
-def to_site(record: SiteRecord, published: Published) -> wire.Site:
-    """Return how a site is doing."""
+def to_site(record: SiteRecord, published: Published, trouble: str | None) -> wire.Site:
+    """Return how a site is doing. trouble: why it is not mapped just now."""
     view = published.view
     constraints: dict[str, dict[str, int]] = {}
     for (kind, state), count in Counter((c.kind, c.state) for c in view.constraints).items():
@@ -67,6 +67,7 @@ def to_site(record: SiteRecord, published: Published) -> wire.Site:
         ],
         merged_into=dict(view.merged_into),
         constraints=constraints,
+        trouble=trouble,
     )
 
 

@@ -8,6 +8,8 @@ from lineloom import wire
 from lineloom_service.answers import answer
 from lineloom_service.convert import to_site
 from lineloom_service.dependencies import KnownSite, ServiceDep
+from lineloom_service.service import Service
+from lineloom_service.store.records import SiteRecord
 
 router = APIRouter(tags=["sites"])
 
@@ -16,14 +18,17 @@ router = APIRouter(tags=["sites"])
 async def list_sites(service: ServiceDep) -> Response:
     """Return all sites."""
     records = await service.store.sites()
-    sites = [to_site(record, service.conductor.published(record.id)) for record in records]
+    sites = [_site(record, service) for record in records]
     return answer(wire.SiteList(sites=sites))
 
 
 @router.get("/v1/sites/{site}", response_model=wire.Site)
 async def get_site(site: KnownSite, service: ServiceDep) -> Response:
-    """Return how a site is doing. `idle`: all that was accepted is in the map."""
-    return answer(to_site(site, service.conductor.published(site.id)))
+    """Return how a site is doing. `idle`: all that was accepted is in the map.
+
+    `trouble`: why it is not mapped just now, such as a log that cannot be read; else null.
+    """
+    return answer(_site(site, service))
 
 
 @router.delete("/v1/sites/{site}", status_code=204)
@@ -34,3 +39,8 @@ async def delete_site(site: KnownSite, service: ServiceDep) -> Response:
         await service.conductor.forget_site(deleted)
         service.maps.forget_site(deleted)
     return Response(status_code=204)
+
+
+def _site(record: SiteRecord, service: Service) -> wire.Site:
+    conductor = service.conductor
+    return to_site(record, conductor.published(record.id), conductor.trouble(record.id))

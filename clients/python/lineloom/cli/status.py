@@ -71,6 +71,8 @@ def _show_site(site: Site, robots: list[Robot]) -> None:
         f"{site.site}: version {site.version}, {site.scans.accepted} scans, {pending}",
         markup=False,
     )
+    if site.trouble is not None:
+        out.print(f"not mapped just now: {site.trouble}", markup=False)
     for kind, states in sorted(site.constraints.items()):
         counts = ", ".join(f"{count} {state}" for state, count in sorted(states.items()))
         out.print(f"{kind} constraints: {counts}", markup=False)

@@ -31,6 +31,7 @@ class Site(Answer):
     idle: all that was accepted is in the map, loops and merges included.
     constraints: counts by kind and, within it, by state.
     merged_into: id of an absorbed component -> id of its survivor.
+    trouble: why it is not mapped just now, None where all is well.
     """
 
     site: str
@@ -41,6 +42,7 @@ class Site(Answer):
     components: list[Component]
     merged_into: dict[str, str]
     constraints: dict[str, dict[str, int]]
+    trouble: str | None = None
 
 
 class SiteList(Answer):
