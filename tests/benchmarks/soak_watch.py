@@ -18,18 +18,25 @@ _TAKEN = b"HTTP/1.1 200"
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """Resident memory of the API process and of each worker, and the size of the saved map."""
+    """Resident memory of the API process and of each worker, beside how much map there is.
+
+    keyframes: the places that the map rests on. saved_bytes: its snapshot, in which the raw scans
+    kept for a while outweigh the rest at first: no measure of how the map grows.
+    """
 
     when: str
-    map_bytes: int
+    keyframes: int
+    saved_bytes: int
     rss_bytes: dict[str, int]
 
 
-def look(when: str, pid: int, map_bytes: int) -> Moment:
+def look(when: str, pid: int, keyframes: int, saved_bytes: int) -> Moment:
     """Look at the service whose API process has this id."""
     children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
     processes = {"API": str(pid)} | {f"worker {k}": child for k, child in enumerate(children, 1)}
-    return Moment(when, map_bytes, {name: _rss(child) for name, child in processes.items()})
+    return Moment(
+        when, keyframes, saved_bytes, {name: _rss(child) for name, child in processes.items()}
+    )
 
 
 class SlowReaders:
@@ -53,6 +60,7 @@ class Watch:
         self.highest_backlog = 0
         self._http = httpx.Client(base_url=url, timeout=60.0)
         self._backlog = f'lineloom_backlog_entries{{site="{site}"}}'
+        self._keyframes = f'lineloom_keyframes{{site="{site}"}}'
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._watch)
 
@@ -68,6 +76,10 @@ class Watch:
     def listeners(self) -> int:
         """How many listen to events now."""
         return self._metric("lineloom_event_streams")
+
+    def keyframes(self) -> int:
+        """How many keyframes the map has now."""
+        return self._metric(self._keyframes)
 
     def refused(self) -> int:
         """How many POSTs were answered 429."""

@@ -9,9 +9,9 @@ MB = 1_000_000
 
 
 def _moments(*api: int) -> list[Moment]:
-    maps = (0, 10, 15)
+    maps = (0, 10_000, 15_000)
     return [
-        Moment(when, size * MB, {"API": rss * MB})
+        Moment(when, size, 0, {"API": rss * MB})
         for when, size, rss in zip(("start", "middle", "end"), maps, api, strict=True)
     ]
 
