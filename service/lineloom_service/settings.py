@@ -66,7 +66,7 @@ class Settings(BaseSettings):
     )
 
     entry_timeout_s: float = Field(
-        default=120.0,
+        default=900.0,
         gt=0.0,
         description="A worker that is at one log entry for longer is ended; see the README.",
     )
