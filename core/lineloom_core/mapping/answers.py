@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -89,4 +89,3 @@ class Evidence:
     votes: float | None = None
     runner_up: RunnerUp | None = None
     margin: float | None = None
-    places: dict[str, int] = field(default_factory=dict)

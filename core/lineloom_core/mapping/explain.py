@@ -43,9 +43,6 @@ def explain(site: SiteMap, constraint: Constraint) -> Evidence:
         votes=votes,
         runner_up=runner_up,
         margin=margin,
-        places={}
-        if constraint.place_a < 0
-        else {"reference": constraint.place_a, "current": constraint.place_b},
     )
 
 

@@ -12,7 +12,6 @@ from lineloom_core.places.place import (
 from lineloom_core.places.recognition import (
     Recognition,
     RecognitionConfig,
-    alias_evidence,
     check_alignment,
     evidence_elsewhere,
     evidence_of,
@@ -28,7 +27,6 @@ __all__ = [
     "PlaceIndex",
     "Recognition",
     "RecognitionConfig",
-    "alias_evidence",
     "check_alignment",
     "conflicting_points",
     "count_points",

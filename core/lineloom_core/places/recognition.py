@@ -109,25 +109,6 @@ def recognise(
     )
 
 
-def alias_evidence(
-    reference: Place,
-    current: Place,
-    T_reference_current: Pose,
-    uncertainty: float,
-    config: RecognitionConfig | None = None,
-) -> float:
-    """How much of `current` could be mistaken for `reference`, in metres of wall.
-
-    The evidence of the best hypothesis that is not the known relative pose, which itself may be
-    wrong by `uncertainty` [m]. Asked of places of one
-    component, or of a place and itself, it tells how distinctive a place is: a room that looks the
-    same turned round, or a corridor like the next one, proves little when it is seen again.
-    """
-    config = config or RecognitionConfig()
-    table = hypotheses(reference, current, config)
-    return evidence_elsewhere(table, T_reference_current, config, slack=uncertainty)
-
-
 def hypotheses(
     reference: Place, current: Place, config: RecognitionConfig | None = None
 ) -> NDArray[np.float64]:
