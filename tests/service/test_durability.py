@@ -3,14 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-import os
 import signal
-import socket
 import subprocess
-import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,39 +14,9 @@ import pytest
 from lineloom_service.server import run
 from lineloom_service.settings import Settings
 
-SERVER = Path(__file__).parent / "serve_fake.py"
+from tests.service.fake_server import free_port, server
+
 ROBOTS = 4
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
-
-
-@contextmanager
-def _server(directory: Path, port: int) -> Iterator[subprocess.Popen[bytes]]:
-    command = [sys.executable, str(SERVER), str(directory), str(port)]
-    environment = {**os.environ, "PYTHONPATH": str(SERVER.parent)}
-    with subprocess.Popen(command, env=environment) as process:
-        try:
-            _wait_up(port, process)
-            yield process
-        finally:
-            process.kill()
-
-
-def _wait_up(port: int, process: subprocess.Popen[bytes]) -> None:
-    for _ in range(600):
-        assert process.poll() is None, "the server ended"
-        try:
-            if httpx.get(f"http://127.0.0.1:{port}/healthz").status_code == 200:
-                return
-        except httpx.TransportError:
-            pass
-        time.sleep(0.05)
-    raise AssertionError("never up")
 
 
 def _scan(seq: int) -> dict[str, Any]:
@@ -112,13 +77,13 @@ async def _send_and_kill(
 
 
 def test_a_killed_server_has_lost_nothing_leaves_no_worker_and_maps_on(tmp_path: Path) -> None:
-    port, acknowledged = _free_port(), dict[str, int]()
-    with _server(tmp_path, port) as process:
+    port, acknowledged = free_port(), dict[str, int]()
+    with server(tmp_path, port) as process:
         workers = _children(process.pid)
         asyncio.run(_send_and_kill(port, process, acknowledged, 151))
         process.wait()
         _wait_gone(workers)
-    with _server(tmp_path, port) as process:
+    with server(tmp_path, port) as process:
         site = _idle(port)
         assert site["scans"]["accepted"] == site["scans"]["processed"] == site["version"]
         robots = httpx.get(f"http://127.0.0.1:{port}/v1/sites/s/robots").json()["robots"]
