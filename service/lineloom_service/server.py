@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import gc
+import logging
+import os
 import signal
 import socket
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
 from types import FrameType
+from typing import NoReturn
 
 import uvicorn
 import uvloop
@@ -29,33 +32,52 @@ def run(settings: Settings) -> None:
     """Serve until SIGINT or SIGTERM. Exits with a message where it cannot even start."""
     log.configure(settings.log_level, settings.log_format)
     try:
-        with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-            runner.run(serve(Service(settings)))
+        run_service(Service(settings))
     except (StoreError, UnprotectedError) as error:
         sys.exit(f"lineloom: {error}")
-    except KeyboardInterrupt:
-        pass  # while starting, or a second time while stopping
+
+
+def run_service(service: Service) -> NoReturn:
+    """Serve until SIGINT or SIGTERM, then end this process. Raises where it cannot even start."""
+    with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
+        # An interrupt while starting, or a second one while stopping.
+        with contextlib.suppress(KeyboardInterrupt):
+            runner.run(serve(service))
+        _leave()
+
+
+def _leave() -> NoReturn:
+    """End the process at once: all is on the disk.
+
+    An ordinary end waits for every thread, and one may be compiling the matcher's kernels: without
+    a cache that is half a minute in which a supervisor loses its patience.
+    """
+    logging.shutdown()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(0)
 
 
 async def serve(service: Service) -> None:
     """Serve until SIGINT or SIGTERM, then save what was mapped."""
+    settings = service.settings
+    config = uvicorn.Config(
+        create_app(service=service),
+        host=settings.host,
+        port=settings.port,
+        log_config=None,
+        proxy_headers=False,
+        access_log=False,
+        timeout_graceful_shutdown=_SHUTDOWN_S,
+        server_header=False,
+        ssl_certfile=settings.ssl_certfile,
+        ssl_keyfile=settings.ssl_keyfile,
+    )
+    # First of all: where the port is taken nothing else has been begun. Nobody is heard yet.
+    listening = config.bind_socket()
     await service.start()
     freezing = asyncio.create_task(_freeze_when_ready(service))
-    settings = service.settings
     try:
-        config = uvicorn.Config(
-            create_app(service=service),
-            host=settings.host,
-            port=settings.port,
-            log_config=None,
-            proxy_headers=False,
-            access_log=False,
-            timeout_graceful_shutdown=_SHUTDOWN_S,
-            server_header=False,
-            ssl_certfile=settings.ssl_certfile,
-            ssl_keyfile=settings.ssl_keyfile,
-        )
-        listening = config.bind_socket()
         _drop_the_deaf(listening, settings.slow_reader_s)
         with _signals_end_only_the_serving():
             await uvicorn.Server(config).serve(sockets=[listening])
@@ -64,7 +86,7 @@ async def serve(service: Service) -> None:
         await service.stop()
 
 
-@contextmanager
+@contextlib.contextmanager
 def _signals_end_only_the_serving() -> Iterator[None]:
     """Have the signal that ended uvicorn end nothing else.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import signal
+import socket
 import subprocess
 import time
 from pathlib import Path
@@ -119,3 +120,18 @@ def _alive(pid: int) -> bool:
 def test_a_service_without_protection_does_not_listen_to_the_world(tmp_path: Path) -> None:
     with pytest.raises(SystemExit, match="nothing protects"):
         run(Settings(data_dir=tmp_path, host="0.0.0.0"))
+
+
+def test_it_stops_while_the_matcher_is_being_compiled(tmp_path: Path) -> None:
+    with server(tmp_path, free_port(), SERVER_COMPILES="yes") as process:
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(60) == 0
+
+
+def test_a_taken_port_is_said_before_anything_is_begun(tmp_path: Path) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        settings = Settings(data_dir=tmp_path / "data", port=taken.getsockname()[1])
+        with pytest.raises(SystemExit):
+            run(settings)
+    assert not (tmp_path / "data").exists()

@@ -64,7 +64,9 @@ class Forwarding:
     async def _await_answer(self, key: str, news: asyncio.Event) -> bytes:
         while True:
             with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(news.wait(), _LOOK_S)
+                # Not `wait_for`, which may lose the end of our patience.
+                async with asyncio.timeout(_LOOK_S):
+                    await news.wait()
             news.clear()
             answer = await self._store.take_answer(key)
             if answer is not None:

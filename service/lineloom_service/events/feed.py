@@ -87,7 +87,9 @@ class EventFeed:
     async def _wait(self, news: asyncio.Event, pause_s: float) -> None:
         pause = pause_s if self._poll_s is None else min(pause_s, self._poll_s)
         with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(news.wait(), pause)
+            # Not `wait_for`: a listener's cancellation that comes with news would be lost.
+            async with asyncio.timeout(pause):
+                await news.wait()
 
     async def _next_messages(self) -> list[Message]:
         place = self._place

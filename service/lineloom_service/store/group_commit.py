@@ -128,7 +128,8 @@ class GroupCommit:
             if pause is not None and pause <= 0:
                 return
             try:
-                await asyncio.wait_for(self._wake.wait(), pause)
+                async with asyncio.timeout(pause):
+                    await self._wake.wait()
             except TimeoutError:
                 return
 
