@@ -40,13 +40,16 @@ def run(settings: Settings) -> None:
 def run_service(service: Service) -> NoReturn:
     """Serve until SIGINT or SIGTERM, then end this process. Raises where it cannot even start."""
     with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-        # An interrupt while starting, or a second one while stopping.
-        with contextlib.suppress(KeyboardInterrupt):
+        try:
             runner.run(serve(service))
-        _leave()
+        except KeyboardInterrupt:
+            _leave(0)  # while starting, or a second time while stopping
+        except SystemExit:
+            _leave(1)  # uvicorn has said that the port is taken
+        _leave(0)
 
 
-def _leave() -> NoReturn:
+def _leave(code: int) -> NoReturn:
     """End the process at once: all is on the disk.
 
     An ordinary end waits for every thread, and one may be compiling the matcher's kernels: without
@@ -55,29 +58,28 @@ def _leave() -> NoReturn:
     logging.shutdown()
     sys.stdout.flush()
     sys.stderr.flush()
-    os._exit(0)
+    os._exit(code)
 
 
 async def serve(service: Service) -> None:
     """Serve until SIGINT or SIGTERM, then save what was mapped."""
-    settings = service.settings
-    config = uvicorn.Config(
-        create_app(service=service),
-        host=settings.host,
-        port=settings.port,
-        log_config=None,
-        proxy_headers=False,
-        access_log=False,
-        timeout_graceful_shutdown=_SHUTDOWN_S,
-        server_header=False,
-        ssl_certfile=settings.ssl_certfile,
-        ssl_keyfile=settings.ssl_keyfile,
-    )
-    # First of all: where the port is taken nothing else has been begun. Nobody is heard yet.
-    listening = config.bind_socket()
     await service.start()
     freezing = asyncio.create_task(_freeze_when_ready(service))
+    settings = service.settings
     try:
+        config = uvicorn.Config(
+            create_app(service=service),
+            host=settings.host,
+            port=settings.port,
+            log_config=None,
+            proxy_headers=False,
+            access_log=False,
+            timeout_graceful_shutdown=_SHUTDOWN_S,
+            server_header=False,
+            ssl_certfile=settings.ssl_certfile,
+            ssl_keyfile=settings.ssl_keyfile,
+        )
+        listening = config.bind_socket()
         _drop_the_deaf(listening, settings.slow_reader_s)
         with _signals_end_only_the_serving():
             await uvicorn.Server(config).serve(sockets=[listening])

@@ -27,11 +27,20 @@ def free_port() -> int:
 @contextmanager
 def server(directory: Path, port: int, **environment: str) -> Iterator[subprocess.Popen[bytes]]:
     """Run a server that answers; it is killed in the end."""
+    with server_process(directory, port, **environment) as process:
+        _wait_up(port, process)
+        yield process
+
+
+@contextmanager
+def server_process(
+    directory: Path, port: int, **environment: str
+) -> Iterator[subprocess.Popen[bytes]]:
+    """Start a server, whatever comes of it; it is killed in the end."""
     command = [sys.executable, str(SERVER), str(directory), str(port)]
     values = {**os.environ, "PYTHONPATH": str(SERVER.parent), **environment}
     with subprocess.Popen(command, env=values) as process:
         try:
-            _wait_up(port, process)
             yield process
         finally:
             process.kill()

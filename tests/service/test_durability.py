@@ -15,7 +15,7 @@ import pytest
 from lineloom_service.server import run
 from lineloom_service.settings import Settings
 
-from tests.service.fake_server import free_port, server
+from tests.service.fake_server import free_port, server, server_process
 
 ROBOTS = 4
 
@@ -128,10 +128,9 @@ def test_it_stops_while_the_matcher_is_being_compiled(tmp_path: Path) -> None:
         assert process.wait(60) == 0
 
 
-def test_a_taken_port_is_said_before_anything_is_begun(tmp_path: Path) -> None:
+def test_it_ends_at_once_where_the_port_is_taken(tmp_path: Path) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
-        settings = Settings(data_dir=tmp_path / "data", port=taken.getsockname()[1])
-        with pytest.raises(SystemExit):
-            run(settings)
-    assert not (tmp_path / "data").exists()
+        port = taken.getsockname()[1]
+        with server_process(tmp_path, port, SERVER_COMPILES="yes") as process:
+            assert process.wait(60) == 1
