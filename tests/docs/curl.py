@@ -26,7 +26,7 @@ class Request:
 
 def requests() -> list[Request]:
     """Every request to the service that a curl command of the docs makes."""
-    return [_read(page, words[1:]) for page, words in shell_commands() if words[0] == "curl"]
+    return [_read(c.page, list(c.words[1:])) for c in shell_commands() if c.words[0] == "curl"]
 
 
 def _read(page: str, words: list[str]) -> Request:

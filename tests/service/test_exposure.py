@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import ssl
 import subprocess
@@ -71,6 +72,18 @@ def test_a_revoked_token_ends_what_it_listens_to(tmp_path: Path) -> None:
             for _ in lines:  # ends, or the test's client times out
                 pass
         assert client.get("/v1/sites").status_code == 401
+
+
+def test_tokens_for_scripts(tmp_path: Path) -> None:
+    where = ("--data-dir", tmp_path, "--json")
+    scopes = ("--scope", "ingest", "--site", "s", "--note", "r's own")
+    made = json.loads(_token("create", *scopes, *where))
+    (listed,) = json.loads(_token("list", *where))["tokens"]
+    assert listed.items() <= made.items()
+    assert made["token"].split("_")[1] == listed["id"]
+    assert (listed["scopes"], listed["site"], listed["note"]) == (["ingest"], "s", "r's own")
+    _token("revoke", listed["id"], "--data-dir", tmp_path)
+    assert json.loads(_token("list", *where))["tokens"][0]["revoked"] > listed["created"]
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "10.0.0.1", "lineloom.example"])

@@ -9,7 +9,9 @@ from typing import Annotated, Any
 
 import typer
 
+from lineloom.cli import options
 from lineloom.cli.console import note as tell
+from lineloom.cli.console import print_json
 from lineloom.cli.failure import CommandError
 
 app = typer.Typer(
@@ -48,6 +50,7 @@ def create(
     ] = None,
     note: Annotated[str, typer.Option(metavar="TEXT", help="Who has it; shown by `list`.")] = "",
     data_dir: DataDir = None,
+    json: options.Json = False,
 ) -> None:
     """Make a token and print it: now, and never again. The service keeps only a digest.
 
@@ -64,12 +67,15 @@ def create(
         )
     except book.TokenRefusedError as error:
         raise CommandError(str(error)) from None
+    if json:
+        print_json({"token": token, **_told(record)})
+        return
     tell(f"token {record.id} for {_good_for(record.scopes, record.site, record.robot)}:")
     print(token)
 
 
 @app.command("list")
-def list_(data_dir: DataDir = None) -> None:
+def list_(data_dir: DataDir = None, json: options.Json = False) -> None:
     """List the tokens: id, what they are good for, when they were made. Never the secrets.
 
     \b
@@ -78,6 +84,9 @@ def list_(data_dir: DataDir = None) -> None:
     """
     book, run = _open(data_dir)
     records = run(book.read_tokens)
+    if json:
+        print_json({"tokens": [_told(record) for record in records]})
+        return
     for record in records:
         state = f"made {_day(record.created)}"
         if record.revoked is not None:
@@ -129,6 +138,12 @@ def _open(data_dir: Path | None) -> tuple[Any, Callable[[Any], Any]]:
             raise CommandError(str(error)) from None
 
     return token_book, run
+
+
+def _told(record: Any) -> dict[str, Any]:
+    """Return what may be known of a token, for scripts."""
+    names = ("id", "scopes", "site", "robot", "note", "created", "revoked")
+    return {name: getattr(record, name) for name in names}
 
 
 def _good_for(scopes: tuple[str, ...], site: str | None, robot: str | None) -> str:
