@@ -17,8 +17,9 @@ from lineloom_core.graph.edge import Edge, EdgeKind, chi_squared, tangent_errors
 from lineloom_core.graph.initialise import initialise_from_tree, rigid_join
 from lineloom_core.graph.inliers import InlierTest, select_inliers
 from lineloom_core.graph.observability import Observability, observe, project_out_weak
+from lineloom_core.graph.piece import Piece, together
 from lineloom_core.graph.pose_graph import PoseGraph
-from lineloom_core.graph.solver import Solution, optimize
+from lineloom_core.graph.solver import Solution, optimize, settle
 
 __all__ = [
     "CHI2_99",
@@ -27,6 +28,7 @@ __all__ = [
     "EdgeKind",
     "InlierTest",
     "Observability",
+    "Piece",
     "PoseGraph",
     "Solution",
     "UndeterminedError",
@@ -43,5 +45,7 @@ __all__ = [
     "project_out_weak",
     "rigid_join",
     "select_inliers",
+    "settle",
     "tangent_errors",
+    "together",
 ]

@@ -68,15 +68,13 @@ def chi_squared(edges: Sequence[Edge], poses: Mapping[int, Pose]) -> NDArray[np.
     return chi2
 
 
-def square_roots(edges: Sequence[Edge]) -> NDArray[np.float64]:
-    """Return R with R^T R = information for every edge, shape (m, 3, 3).
+def square_roots(information: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return R with R^T R = information, both of shape (m, 3, 3).
 
     By eigenvalues, not by Cholesky: a corridor's information is singular along the corridor, and
     is as good an edge as any across it.
     """
-    if not edges:
-        return np.zeros((0, 3, 3))
-    values, vectors = np.linalg.eigh(np.stack([e.information for e in edges]))
+    values, vectors = np.linalg.eigh(information)
     roots: NDArray[np.float64] = np.sqrt(np.maximum(values, 0.0))[:, :, None] * np.swapaxes(
         vectors, 1, 2
     )

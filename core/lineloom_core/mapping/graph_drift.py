@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lineloom_core.graph import Covariances, Edge, PoseGraph
+from lineloom_core.graph import Covariances, Piece, PoseGraph
 from lineloom_core.mapping.keyframe import Keyframe
 
 
@@ -23,23 +23,23 @@ class GraphDrift:
         self._graph = graph
         self._keyframes = keyframes
         self._known: dict[int, Covariances] = {}
-
-    def forget(self) -> None:
-        """The graph has changed."""
-        self._known.clear()
+        self._known_at = graph.changes
 
     def between(self, a: int, b: int) -> NDArray[np.float64]:
         """Covariance (3, 3) of T_a_b, two keyframes of one component, in the tangent at b."""
+        if self._known_at != self._graph.changes:
+            self._known, self._known_at = {}, self._graph.changes
         root = self._graph.component_root(a)
         if root not in self._known:
-            nodes, edges = self._graph.component_subgraph(root)
-            self._known[root] = Covariances(nodes, [self._as_measured(e) for e in edges], root)
+            self._known[root] = Covariances(self._as_measured(self._graph.piece(root)), root)
         return self._known[root].relative(a, b)
 
-    def _as_measured(self, edge: Edge) -> Edge:
-        """A tracked step with the drift measured on it; another edge as the graph takes it."""
-        step = self._keyframes[edge.node_b].step
-        if edge.kind != "sequential" or step is None:
-            return edge
-        information = np.linalg.inv(step.drift)
-        return replace(edge, information=0.5 * (information + information.T))
+    def _as_measured(self, piece: Piece) -> Piece:
+        """Tracked steps with the drift measured on them; other edges as the graph takes them."""
+        tracked = ~piece.robust
+        steps = (self._keyframes[k].step for k in piece.ids[piece.ends[tracked, 1]].tolist())
+        drifts = [step.drift for step in steps if step is not None]
+        measured = np.linalg.inv(np.array(drifts).reshape(-1, 3, 3))
+        information = piece.information.copy()
+        information[tracked] = 0.5 * (measured + np.swapaxes(measured, 1, 2))
+        return replace(piece, information=information)

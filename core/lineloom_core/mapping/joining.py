@@ -9,12 +9,13 @@ they would overlap; 6. accept, join, optimise.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from lineloom_core.geometry import Pose
-from lineloom_core.graph import consistent_sets, optimize, pairwise_consistent, rigid_join
+from lineloom_core.graph import consistent_sets, pairwise_consistent, rigid_join, settle, together
 from lineloom_core.mapping.changes import ComponentMerged
 from lineloom_core.mapping.constraint import CONSTRAINT_FLOOR, Constraint, turned_round
 from lineloom_core.mapping.distinctive import is_distinctive
@@ -141,18 +142,20 @@ def _objection_to_set(site: SiteMap, chosen: list[Constraint], rival: list[Const
 
 def _solved_together(
     site: SiteMap, a_root: int, b_root: int, chosen: list[Constraint]
-) -> tuple[Pose, dict[int, Pose]]:
+) -> tuple[Pose, Mapping[int, Pose]]:
     """T_A_B, and all poses in a's frame as they would be if the set were believed.
 
     Both maps have drifted: held against each other as rigid pieces, right ones would collide.
     """
-    nodes_a, edges_a = site.graph.component_subgraph(a_root)
-    nodes_b, edges_b = site.graph.component_subgraph(b_root)
     between = [c.edge() for c in chosen]
-    T_A_B = rigid_join(nodes_a, nodes_b, between)
-    nodes = {**nodes_a, **{n: T_A_B @ pose for n, pose in nodes_b.items()}}
-    solution = optimize(nodes, [*edges_a, *edges_b, *between], anchors=(a_root,))
-    return T_A_B, solution.poses
+    T_A_B = rigid_join(
+        {c.keyframe_a: site.pose(c.keyframe_a) for c in chosen},
+        {c.keyframe_b: site.pose(c.keyframe_b) for c in chosen},
+        between,
+    )
+    piece_a, piece_b = site.graph.piece(a_root), site.graph.piece(b_root).moved(T_A_B)
+    both = together(piece_a, piece_b).with_edges(between)
+    return T_A_B, both.table(settle(both, both.row(a_root)))
 
 
 def _drop_others(site: SiteMap, candidates: list[Constraint], chosen: list[Constraint]) -> None:

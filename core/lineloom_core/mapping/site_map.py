@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lineloom_core.geometry import Pose
-from lineloom_core.graph import PoseGraph, optimize
+from lineloom_core.graph import PoseGraph, settle
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.constraint import Constraint, step_id
 from lineloom_core.mapping.drift import way_drift
@@ -19,7 +19,6 @@ from lineloom_core.mapping.graph_drift import GraphDrift
 from lineloom_core.mapping.keyframe import Keyframe
 from lineloom_core.mapping.memory import Memory
 from lineloom_core.mapping.place_making import make_place
-from lineloom_core.mapping.positions import Positions
 from lineloom_core.mapping.track import Track
 from lineloom_core.mapping.verdicts import Verdicts
 from lineloom_core.places import Place
@@ -52,7 +51,6 @@ class SiteMap:
         self.now = 0
         """Version of the latest keyframe: when what is decided now is decided."""
         self._track_of: dict[int, Track] = {}
-        self._positions = Positions()
         self._graph_drift = GraphDrift(self.graph, self.keyframes)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -81,13 +79,13 @@ class SiteMap:
             track = self.tracks[name] = Track(name, keyframe.robot)
             track.append(keyframe.id, Pose.identity(), np.zeros((3, 3)))
             self._track_of[keyframe.id] = track
-            self.add_node(keyframe.id, Pose.identity())
+            self.graph.add_node(keyframe.id, Pose.identity())
             return None
         track = self._track_of[step.previous]
         T = step.T_previous_this
         track.append(keyframe.id, T, step.drift)
         self._track_of[keyframe.id] = track
-        self.add_node(keyframe.id, self.pose(step.previous) @ T)
+        self.graph.add_node(keyframe.id, self.pose(step.previous) @ T)
         constraint = Constraint(
             id=step_id(keyframe.id),
             kind="sequential",
@@ -121,7 +119,7 @@ class SiteMap:
 
     def pose(self, keyframe: int) -> Pose:
         """T_map_laser of a keyframe in its component's frame, as the graph has it now."""
-        return self.graph.nodes[keyframe]
+        return self.graph.pose(keyframe)
 
     def component_root(self, keyframe: int) -> int:
         """The oldest keyframe of the component: its anchor and name giver."""
@@ -176,7 +174,6 @@ class SiteMap:
         if not constraint.history:
             constraint = constraint.moved_to(constraint.state, constraint.reason, self.now)
         self.constraints[constraint.id] = constraint
-        self._graph_drift.forget()
         in_graph = constraint.id in self.graph.edges
         if constraint.state == "accepted" and not in_graph:
             self.graph.add_edge(constraint.edge())
@@ -186,24 +183,14 @@ class SiteMap:
         elif constraint.state != "accepted" and in_graph:
             self.graph.remove_edge(constraint.id)
 
-    def add_node(self, keyframe: int, pose: Pose) -> None:
-        """Put a keyframe into the graph at T_map_laser."""
-        self.graph.add_node(keyframe, pose)
-        self._positions.add(keyframe, pose)
-
     def move_component(self, keyframe: int, T_new_old: Pose) -> None:
         """Move the component of a keyframe rigidly: into the frame of the one it joins."""
         self.graph.move_component(keyframe, T_new_old)
-        self._graph_drift.forget()
-        self._positions.reset(self.graph.nodes)
 
     def optimise(self, keyframe: int) -> None:
         """Solve the component of a keyframe; its oldest keyframe stays where it is."""
-        nodes, edges = self.graph.component_subgraph(keyframe)
-        solution = optimize(nodes, edges, anchors=(min(nodes),))
-        self.graph.set_poses(solution.poses)
-        self._graph_drift.forget()
-        self._positions.reset(self.graph.nodes)
+        piece = self.graph.piece(keyframe)
+        self.graph.take_poses(piece, settle(piece, held=0))
 
     def places_in_component(self, keyframe: int) -> int:
         """Number of places in the component of a keyframe."""
@@ -212,12 +199,7 @@ class SiteMap:
 
     def nearby(self, keyframe: int, radius: float) -> list[tuple[int, float]]:
         """Keyframes of the same component within `radius` m, nearest first, with distances."""
-        root = self.component_root(keyframe)
-        return [
-            (other, distance)
-            for other, distance in self._positions.within(self.pose(keyframe), radius)
-            if other != keyframe and self.component_root(other) == root
-        ]
+        return self.graph.within(keyframe, radius)
 
     def neighbours_on_track(self, keyframe: int, reach: int) -> list[int]:
         """The keyframe and up to `reach` before and after it on its track, itself first."""

@@ -76,8 +76,7 @@ def _robot(site: SiteMap, record: RobotRecord, component_of: dict[int, str]) -> 
 
 def _covariance(site: SiteMap, keyframe: int) -> NDArray[np.float64]:
     """Covariance of a keyframe's pose against its component's anchor, in the map's axes."""
-    nodes, edges = site.graph.component_subgraph(keyframe)
-    covariances = Covariances(nodes, edges, anchor=site.component_root(keyframe))
+    covariances = Covariances(site.graph.piece(keyframe), site.component_root(keyframe))
     return in_map_axes(covariances.of(keyframe), site.pose(keyframe))
 
 

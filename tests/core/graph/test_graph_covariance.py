@@ -9,6 +9,7 @@ from lineloom_core.geometry import Pose
 from lineloom_core.graph import (
     Covariances,
     Edge,
+    Piece,
     UndeterminedError,
     in_map_axes,
     initialise_from_tree,
@@ -50,7 +51,7 @@ def test_marginals_agree_with_gtsam() -> None:
     prior = gtsam.noiseModel.Isotropic.Sigma(3, 1e-6)
     graph.add(gtsam.PriorFactorPose2(4, gtsam.Pose2(at.x, at.y, at.theta), prior))
     marginals = gtsam.Marginals(graph, values)
-    covariances = Covariances(poses, edges, anchor=4)
+    covariances = Covariances(Piece.of(poses, edges), anchor=4)
     for node in (0, 5, 24):
         np.testing.assert_allclose(
             covariances.of(node), marginals.marginalCovariance(node), rtol=1e-4, atol=1e-9
@@ -60,8 +61,9 @@ def test_marginals_agree_with_gtsam() -> None:
 
 def test_relative_covariance_does_not_depend_on_the_anchor() -> None:
     poses, edges = small_graph()
-    first = Covariances(poses, edges, anchor=0).relative(7, 19)
-    other = Covariances(poses, edges, anchor=7)
+    piece = Piece.of(poses, edges)
+    first = Covariances(piece, anchor=0).relative(7, 19)
+    other = Covariances(piece, anchor=7)
     np.testing.assert_allclose(first, other.relative(7, 19), rtol=1e-9, atol=1e-14)
     np.testing.assert_allclose(first, other.of(19), rtol=1e-9, atol=1e-14)
     np.testing.assert_allclose(
@@ -76,7 +78,8 @@ def test_one_edge_gives_back_its_own_covariance() -> None:
     edge = Edge("e", "loop", 0, 1, T, information, True)
     C = marginal_covariance({0: Pose(3.0, 1.0, 2.0), 1: Pose(3.0, 1.0, 2.0) @ T}, [edge], 0, 1)
     np.testing.assert_allclose(C, np.linalg.inv(information), rtol=1e-9)
-    halved = Covariances({0: Pose.identity(), 1: T}, [edge], 0, weights={"e": 0.5}).of(1)
+    piece = Piece.of({0: Pose.identity(), 1: T}, [edge])
+    halved = Covariances(piece, 0, weights=np.array([0.5])).of(1)
     np.testing.assert_allclose(halved, 2.0 * np.linalg.inv(information), rtol=1e-9)
 
 
@@ -95,9 +98,9 @@ def test_covariance_in_map_axes_follows_the_samples() -> None:
 def test_what_hangs_loose_is_said_so() -> None:
     free = Edge("e", "loop", 0, 1, Pose.identity(), np.diag([0.0, 10.0, 10.0]), True)
     with pytest.raises(UndeterminedError):
-        Covariances({0: Pose.identity(), 1: Pose.identity()}, [free], 0).of(1)
+        Covariances(Piece.of({0: Pose.identity(), 1: Pose.identity()}, [free]), 0)
     with pytest.raises(KeyError, match="5"):
-        Covariances({0: Pose.identity(), 5: Pose.identity()}, [], 0).of(5)
+        Covariances(Piece.of({0: Pose.identity()}, []), 0).of(5)
 
 
 def test_tree_follows_the_surest_path() -> None:

@@ -15,49 +15,7 @@ from lineloom_core.geometry import Pose
 from lineloom_core.graph import Edge, optimize, project_out_weak
 from lineloom_core.graph.edge import chi_squared
 
-INFORMATION = np.diag([2500.0, 2500.0, 40000.0])
-
-
-def perturbed(pose: Pose, rng: np.random.Generator) -> Pose:
-    return pose @ Pose.from_array(rng.normal(0.0, [0.02, 0.02, 0.005]))
-
-
-def laps(n: int, loops: int, seed: int, wrong: int = 0) -> tuple[list[Pose], list[Edge]]:
-    """A robot driving laps of 80 m; loop edges between passes; the last `wrong` are nonsense."""
-    rng = np.random.default_rng(seed)
-    truth = [Pose.identity()]
-    for i in range(1, n):
-        truth.append(truth[-1] @ Pose(0.5, 0.0, math.pi / 2 if i % 40 == 0 else 0.0))
-    edges = [
-        Edge(
-            f"s{i}", "sequential", i - 1, i, perturbed(Pose(0.5, 0.0, 0.0), rng), INFORMATION, False
-        )
-        if i % 40
-        else Edge(
-            f"s{i}",
-            "sequential",
-            i - 1,
-            i,
-            perturbed(Pose(0.5, 0.0, math.pi / 2), rng),
-            INFORMATION,
-            False,
-        )
-        for i in range(1, n)
-    ]
-    for k in range(loops):
-        i = int(rng.integers(0, n - 160))
-        T = perturbed(truth[i].between(truth[i + 160]), rng)
-        if k >= loops - wrong:
-            T = T @ Pose(3.0, -2.0, 0.8)
-        edges.append(Edge(f"l{k}", "loop", i, i + 160, T, INFORMATION, True))
-    return truth, edges
-
-
-def dead_reckoning(n: int, edges: list[Edge]) -> dict[int, Pose]:
-    poses = {0: Pose.identity()}
-    for edge in edges[: n - 1]:
-        poses[edge.node_b] = poses[edge.node_a] @ edge.T_a_b
-    return poses
+from tests.core.graph.graphs import INFORMATION, dead_reckoning, laps
 
 
 def rmse(poses: dict[int, Pose], truth: list[Pose]) -> float:

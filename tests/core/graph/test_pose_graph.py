@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import pickle
 
 import networkx as nx
 import numpy as np
 import pytest
 from lineloom_core.geometry import Pose
-from lineloom_core.graph import Edge, PoseGraph
+from lineloom_core.graph import Edge, Piece, PoseGraph
 
 INFORMATION = np.diag([100.0, 100.0, 400.0])
 
@@ -47,43 +48,71 @@ def test_components_against_networkx_while_edges_come_and_go() -> None:
         assert graph.connected(node, other) == nx.has_path(reference, node, other)
 
 
-def test_subgraph_holds_the_edges_inside_only() -> None:
-    graph = chain([0, 1, 2, 3, 4])
-    for a, b in [(0, 1), (1, 2), (3, 4)]:
+def test_a_piece_is_one_component_by_ascending_ids() -> None:
+    graph = chain([7, 1, 2, 3, 4])
+    for a, b in [(7, 1), (1, 2), (3, 4)]:
         graph.add_edge(link(a, b))
-    poses, edges = graph.subgraph([1, 2, 3])
-    assert list(poses) == [1, 2, 3]
-    assert [e.id for e in edges] == ["1-2"]
-    poses, edges = graph.component_subgraph(2)
-    assert list(poses) == [0, 1, 2]
-    assert [e.id for e in edges] == ["0-1", "1-2"]
+    piece = graph.piece(2)
+    assert piece.ids.tolist() == [1, 2, 7]
+    assert piece.ends.tolist() == [[2, 0], [0, 1]]
+    np.testing.assert_array_equal(piece.poses[2], graph.nodes[7].to_array())
+    assert graph.piece(4).ids.tolist() == [3, 4]
+    plain = Piece.of(
+        {k: graph.nodes[k] for k in (1, 2, 7)}, [graph.edges["7-1"], graph.edges["1-2"]]
+    )
+    for field in ("poses", "ends", "measured", "information", "robust"):
+        np.testing.assert_array_equal(getattr(plain, field), getattr(piece, field))
+
+
+def test_taking_poses_leaves_other_components_alone() -> None:
+    graph = chain([5, 3, 1])
+    graph.add_edge(link(5, 1))
+    piece, before = graph.piece(5), graph.changes
+    graph.take_poses(piece, np.array([[9.0, 8.0, 0.7], [4.0, 3.0, 0.2]]))
+    assert graph.pose(1) == Pose(9.0, 8.0, 0.7)
+    assert graph.nodes[5] == Pose(4.0, 3.0, 0.2)
+    assert graph.pose(3) == Pose(1.0, 0.0, 0.0)
+    assert graph.changes > before
+
+
+def test_what_is_near_is_of_the_same_component_and_nearest_first() -> None:
+    graph = chain(list(range(9)))
+    for a, b in itertools.pairwise(range(8)):
+        graph.add_edge(link(a, b))
+    graph.add_node(20, Pose(3.2, 0.0, 1.0))
+    assert graph.within(3, 2.0) == [(2, 1.0), (4, 1.0), (1, 2.0), (5, 2.0)]
+    assert graph.within(8, 3.0) == []
+    graph.add_edge(link(20, 0))
+    assert [node for node, _ in graph.within(3, 1.0)] == [20, 2, 4]
 
 
 def test_residual_is_the_whitened_norm() -> None:
     graph = chain([0, 1])
     graph.add_edge(link(0, 1, Pose(0.9, 0.0, 0.0)))
-    assert graph.residual("0-1") == pytest.approx(1.0)
     assert graph.residuals() == {"0-1": pytest.approx(1.0)}
-    assert graph.residual(link(0, 1, Pose(1.0, 0.0, 0.1))) == pytest.approx(2.0, rel=1e-2)
+    graph.add_edge(Edge("turned", "loop", 1, 0, Pose(-1.0, 0.0, 0.1), INFORMATION, True))
+    assert graph.residuals()["turned"] == pytest.approx(2.0, rel=1e-2)
 
 
 def test_moving_a_component_keeps_its_residuals_and_leaves_others() -> None:
     graph = chain([0, 1, 2])
     graph.add_edge(link(0, 1, Pose(0.9, 0.1, 0.2)))
-    before, third = graph.residual("0-1"), graph.nodes[2]
+    before, third = graph.residuals()["0-1"], graph.nodes[2]
     graph.move_component(1, Pose(5.0, -3.0, 2.0))
-    assert graph.residual("0-1") == pytest.approx(before)
+    assert graph.residuals()["0-1"] == pytest.approx(before)
     assert graph.nodes[0].x == pytest.approx(5.0)
     assert graph.nodes[2] == third
 
 
-def test_removing_a_node_takes_its_edges() -> None:
+def test_edges_at_a_node_go_with_them() -> None:
     graph = chain([0, 1, 2])
     graph.add_edge(link(0, 1))
     graph.add_edge(link(1, 2))
-    assert [e.id for e in graph.remove_node(1)] == ["0-1", "1-2"]
-    assert graph.components() == ((0,), (2,))
-    assert not graph.edges
+    assert [e.id for e in graph.edges_at(1)] == ["0-1", "1-2"]
+    graph.remove_edge("0-1")
+    assert [e.id for e in graph.edges_at(1)] == ["1-2"]
+    assert graph.edges_at(0) == ()
+    assert graph.piece(1).ends.tolist() == [[0, 1]]
 
 
 def test_pickles_to_the_same() -> None:
@@ -108,7 +137,9 @@ def test_mistakes_are_named() -> None:
     with pytest.raises(KeyError, match="nope"):
         graph.remove_edge("nope")
     with pytest.raises(KeyError, match="9"):
-        graph.set_poses({9: Pose.identity()})
+        graph.pose(9)
+    with pytest.raises(KeyError, match="9"):
+        graph.piece(0).row(9)
     with pytest.raises(ValueError, match="itself"):
         link(3, 3)
     with pytest.raises(ValueError, match="symmetric"):

@@ -1,0 +1,39 @@
+"""An array that rows are appended to."""
+
+from __future__ import annotations
+
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+_Scalar = TypeVar("_Scalar", bound=np.generic)
+
+
+class GrowingArray(Generic[_Scalar]):
+    """Rows of one shape, at the price of a list: room is doubled when it runs out."""
+
+    def __init__(self, dtype: type[_Scalar], shape: tuple[int, ...] = ()) -> None:
+        self._room: NDArray[_Scalar] = np.empty((16, *shape), dtype=dtype)
+        self._count = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    def append(self, row: Any) -> None:
+        """Add one row."""
+        if self._count == len(self._room):
+            self._room = np.concatenate([self._room, np.empty_like(self._room)])
+        self._room[self._count] = row
+        self._count += 1
+
+    @property
+    def rows(self) -> NDArray[_Scalar]:
+        """All rows, to be read and written; valid until the next is appended."""
+        return self._room[: self._count]
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"_room": self.rows.copy(), "_count": self._count}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
