@@ -15,7 +15,7 @@ from pathlib import Path
 
 from lineloom import Client
 from lineloom.cli.child_service import ChildService
-from lineloom_core.simulation import Fleet, sick_lms200
+from lineloom_core.simulation import Fleet, Lidar, sick_lms200
 
 from tests.benchmarks.environment import environment
 from tests.benchmarks.row import Row, table
@@ -33,12 +33,12 @@ def restarting(*, quick: bool) -> list[Row]:
     with tempfile.TemporaryDirectory(prefix="lineloom-bench-") as name, environment(_SETTINGS):
         service = ChildService(Path(name))
         with service:
-            version = _map(service, count)
+            version = drive(service, count, sick_lms200())
             saved_bytes(service.data_dir)
-            _kill(service)
-        restored = _seconds_away(service, version)
+            kill(service)
+        restored = seconds_away(service, version)
         drop_snapshots(service.data_dir)
-        replayed = _seconds_away(service, version)
+        replayed = seconds_away(service, version)
     return [
         Row(
             name=f"restart after SIGKILL, a site of {count} scans, until its map is there",
@@ -53,9 +53,8 @@ def restarting(*, quick: bool) -> list[Row]:
     ]
 
 
-def _map(service: ChildService, count: int) -> int:
+def drive(service: ChildService, count: int, lidar: Lidar) -> int:
     """Post the drives of some robots; the version of the map that they made."""
-    lidar = sick_lms200()
     duration_s = 1.05 * count / (ROBOTS * lidar.rate_hz)
     fleet = Fleet.office(seed=4, robots=ROBOTS, duration_s=duration_s, lidar=lidar)
     seen = list(islice(fleet.scans(), count))
@@ -68,13 +67,14 @@ def _map(service: ChildService, count: int) -> int:
         return client.wait_until_idle(SITE).version
 
 
-def _kill(service: ChildService) -> None:
+def kill(service: ChildService) -> None:
+    """End the service, and its workers, as a power cut would."""
     assert service.pid is not None
     os.killpg(service.pid, signal.SIGKILL)  # its workers as well
 
 
-def _seconds_away(service: ChildService, version: int) -> float:
-    """Start, wait until all is as before, kill."""
+def seconds_away(service: ChildService, version: int) -> float:
+    """Start, wait until all is as before, kill; how long that took."""
     begin = time.perf_counter()
     with service:
         service.wait_until_ready(600.0)
@@ -82,7 +82,7 @@ def _seconds_away(service: ChildService, version: int) -> float:
             while client.map(SITE).version < version:
                 time.sleep(_POLL_S)
         seconds = time.perf_counter() - begin
-        _kill(service)
+        kill(service)
     return seconds
 
 

@@ -24,6 +24,19 @@ def saved_bytes(folder: Path, timeout_s: float = 120.0) -> int:
     raise TimeoutError(f"not saved after {timeout_s:g} s: {folder}")
 
 
+def log_bytes(folder: Path) -> int:
+    """Size of a stopped service's database without the snapshots in it [bytes]."""
+    with closing(_open(folder)) as database:
+        (free, page, pages), snapshots = (
+            next(database.execute(query))
+            for query in (
+                "SELECT * FROM pragma_freelist_count, pragma_page_size, pragma_page_count",
+                "SELECT SUM(LENGTH(data)) FROM snapshots",
+            )
+        )
+    return int((pages - free) * page - snapshots[0])
+
+
 def drop_snapshots(folder: Path) -> None:
     """Leave a service that has stopped nothing but the log."""
     with closing(_open(folder)) as database, database:

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.benchmarks.row import Row, median_seconds, table
+from tests.benchmarks.site_sizes import HEAD, SiteSize
 
 FAST = Row("a", 50.0, "µs", "lower", 60.0, "twin", 500.0)
 MANY = Row("b", 80.0, "x", "higher", 40.0, "driving", 2.0)
@@ -40,6 +41,15 @@ def test_the_median_is_taken_after_one_run_for_nothing() -> None:
     seen: list[int] = []
     median_seconds(seen.append, [1, 2, 3], repeats=2)
     assert seen == [1, 1, 1, 2, 2, 3, 3]
+
+
+def test_a_site_is_a_row_under_its_table_s_head() -> None:
+    mib = 1024**2
+    row = SiteSize(1000, 181, 64, 90, 200 * mib, 16 * mib, 2.5, 2 * mib, mib, 1.0, 2.0).row()
+    cells = dict(zip(HEAD.splitlines()[0].split("|"), row.split("|"), strict=True))
+    assert cells[" of it per keyframe "].strip() == "256 KiB"
+    assert cells[" CPU per scan "].strip() == "2.5 ms"
+    assert cells[" disk per scan "].strip() == "2.0 KiB"
 
 
 def test_the_benchmark_runs_without_data_and_prints_json(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 import typer
 from lineloom.cli.app import app as command_line
+from lineloom_core.mapping.config import MapperConfig
 from lineloom_service.app import create_app
 from lineloom_service.errors import KINDS
 from lineloom_service.observation.durations import Durations, Histogram
@@ -153,3 +154,12 @@ def test_every_reason_to_withdraw() -> None:
     assert len(reasons) >= 3, "the search for reasons is broken"
     page = " ".join((ROOT / "core" / "docs" / "concepts.md").read_text(encoding="utf-8").split())
     assert sorted(reason for reason in reasons if reason not in page) == []
+
+
+def test_the_parameters_of_the_tuning_guide_are_the_mapper_s() -> None:
+    page = (ROOT / "service" / "docs" / "tuning.md").read_text(encoding="utf-8")
+    told = re.findall(r"`([a-z]+)\.([a-z_]+)` \(([\d.]+)\)", page)
+    assert len(told) > 8, "the search for parameters is broken"
+    config = MapperConfig()
+    real = [(part, name, str(getattr(getattr(config, part), name))) for part, name, _ in told]
+    assert told == real
