@@ -26,6 +26,11 @@ from lineloom_service.store.records import StoreError
 
 _SHUTDOWN_S = 5
 _LOOK_EVERY_S = 0.5
+_SWITCH_S = 0.001
+"""How long a thread that renders or writes has the interpreter while an answer waits for it."""
+
+_FULL_COLLECTION_EVERY = 100
+"""Collections of the middle generation; Python's 10 came every two seconds under load."""
 
 
 def run(settings: Settings) -> None:
@@ -63,6 +68,7 @@ def _leave(code: int) -> NoReturn:
 
 async def serve(service: Service) -> None:
     """Serve until SIGINT or SIGTERM, then save what was mapped."""
+    sys.setswitchinterval(_SWITCH_S)
     await service.start()
     freezing = asyncio.create_task(_freeze_when_ready(service))
     settings = service.settings
@@ -113,6 +119,8 @@ async def _freeze_when_ready(service: Service) -> None:
         await asyncio.sleep(_LOOK_EVERY_S)
     gc.collect()
     gc.freeze()
+    young, middle, _ = gc.get_threshold()
+    gc.set_threshold(young, middle, _FULL_COLLECTION_EVERY)
 
 
 def _drop_the_deaf(listening: socket.socket, patience_s: float) -> None:

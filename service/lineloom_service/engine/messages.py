@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from lineloom_core.mapping.site_view import SiteView
 
+from lineloom_service.engine.view_parts import ViewParts
 from lineloom_service.observation.durations import Durations
 from lineloom_service.store.records import LogEntry
 
@@ -97,6 +98,23 @@ class View:
 
 
 @dataclass(frozen=True, slots=True)
+class EncodedView:
+    """A `View` as it travels."""
+
+    site: int
+    run: int
+    position: int
+    parts: ViewParts
+
+
+@dataclass(frozen=True, slots=True)
+class Stopped:
+    """The site is hosted no longer: nothing more comes of it."""
+
+    site: int
+
+
+@dataclass(frozen=True, slots=True)
 class Snapshot:
     """The state after all that was fed."""
 
@@ -133,3 +151,5 @@ class Timed:
 
 
 Report = Timed | Ready | Started | Fed | View | Snapshot | Answered | Failed
+Sent = Report | EncodedView | Stopped
+"""What a worker sends; `WorkerProcess` makes reports of it."""

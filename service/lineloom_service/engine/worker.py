@@ -9,7 +9,7 @@ import signal
 import threading
 import time
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 
 from lineloom_core import timing
@@ -19,21 +19,23 @@ from lineloom_service.engine.mapper import QUESTIONS, Mapper, MapperFactory, app
 from lineloom_service.engine.messages import (
     Answered,
     Ask,
+    EncodedView,
     Failed,
     Fed,
     Feed,
     Order,
     Ready,
-    Report,
+    Sent,
     Snapshot,
     Started,
     StartSite,
+    Stopped,
     StopSite,
     TakeSnapshot,
     Timed,
-    View,
 )
 from lineloom_service.engine.turns import Turns
+from lineloom_service.engine.view_parts import ViewEncoder
 from lineloom_service.observation.durations import Durations
 from lineloom_service.observation.log import configure_from_environment
 from lineloom_service.store.records import LogEntry
@@ -60,6 +62,7 @@ class _Hosted:
     due: float | None = None
     earliest: float = 0.0
     pause: float = 0.0
+    encoder: ViewEncoder = field(default_factory=ViewEncoder)
 
 
 class Worker:
@@ -70,7 +73,7 @@ class Worker:
 
     def __init__(
         self,
-        connection: Connection[Report, Order],
+        connection: Connection[Sent, Order],
         current: CurrentEntry,
         factory: MapperFactory,
         publish_every_s: float,
@@ -124,6 +127,7 @@ class Worker:
             self._answer(order)
         elif isinstance(order, StopSite):
             self._sites.pop(order.site, None)
+            self._connection.send(Stopped(order.site))
         return True
 
     def _start(self, order: StartSite) -> None:
@@ -232,14 +236,14 @@ class Worker:
         hosted.due = None
         self._current.mark(site, BUSY)
         try:
-            view = hosted.mapper.view()
+            parts = hosted.encoder.encode(hosted.mapper.view())
         except Exception:
             # The site stays at its last view, and is not idle: that is the truth.
             _LOG.exception("site %d: no view after entry %d", site, hosted.position)
         else:
             self._durations.observe("view", time.monotonic() - started)
             self._connection.send(Timed(self._durations.take()))
-            self._connection.send(View(site, hosted.run, hosted.position, view))
+            self._connection.send(EncodedView(site, hosted.run, hosted.position, parts))
         self._current.clear()
         hosted.earliest = time.monotonic()
         hosted.pause = (hosted.earliest - started) / _PUBLISHING_SHARE
@@ -270,7 +274,7 @@ def run_worker(
     factory = load(mapper)
     if warm_up is not None:
         load(warm_up)()
-    connection: Connection[Report, Order] = Connection(pipe)
+    connection: Connection[Sent, Order] = Connection(pipe)
     # The service has closed its end: nobody is left to report to.
     with contextlib.suppress(BrokenPipeError, ConnectionResetError):
         Worker(connection, CurrentEntry(current), factory, publish_every_s).serve()

@@ -14,7 +14,16 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection, Pipe
 
 from lineloom_service.engine.current_entry import CurrentEntry
-from lineloom_service.engine.messages import Order, Ready, Report
+from lineloom_service.engine.messages import (
+    EncodedView,
+    Order,
+    Ready,
+    Report,
+    Sent,
+    Stopped,
+    View,
+)
+from lineloom_service.engine.view_parts import ViewDecoder
 
 
 class WorkerProcess:
@@ -43,8 +52,9 @@ class WorkerProcess:
         self._blamed: tuple[int, int] | None = None
         self._hung_s: float | None = None
         self._alive = True
+        self._decoders: dict[int, tuple[int, ViewDecoder]] = {}
         ours, theirs = Pipe()
-        self._connection: Connection[Order, Report] = ours
+        self._connection: Connection[Order, Sent] = ours
         life, self._life = os.pipe()
         descriptors = (theirs.fileno(), life, self._current.fd)
         arguments = (mapper, warm_up or "", publish_every_s, *descriptors)
@@ -112,8 +122,9 @@ class WorkerProcess:
     def _receive_reports(self) -> None:
         with contextlib.suppress(EOFError, OSError):
             while True:
-                report = self._connection.recv()
-                self._tell(self._take, report)
+                report = self._read(self._connection.recv())
+                if report is not None:
+                    self._tell(self._take, report)
         self._orders.put(None)
         self._process.wait()
         self._sender.join()  # before its pipe's number can be another's
@@ -123,6 +134,18 @@ class WorkerProcess:
         self._connection.close()
         os.close(self._life)
         self._tell(self._on_death)
+
+    def _read(self, sent: Sent) -> Report | None:
+        if isinstance(sent, Stopped):
+            self._decoders.pop(sent.site, None)
+            return None
+        if not isinstance(sent, EncodedView):
+            return sent
+        run, decoder = self._decoders.get(sent.site, (None, ViewDecoder()))
+        if run != sent.run:
+            decoder = ViewDecoder()  # the worker's encoder is a new one as well
+        self._decoders[sent.site] = sent.run, decoder
+        return View(sent.site, sent.run, sent.position, decoder.decode(sent.parts))
 
     def _take(self, report: Report) -> None:
         if isinstance(report, Ready):

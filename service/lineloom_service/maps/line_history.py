@@ -60,7 +60,7 @@ class LineHistory:
         lines: dict[str, Written] = {}
         for line in view.lines:
             written = before.get(line.id)
-            if written is None or written.line != line:
+            if written is None or (written.line is not line and written.line != line):
                 written = Written(line, self._write(line), view.version)
             lines[line.id] = written
         self._versions.append(view.version)

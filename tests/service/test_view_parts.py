@@ -1,0 +1,99 @@
+"""Views travel in parts: whole at the other end, and only what changed is sent and made anew."""
+
+from __future__ import annotations
+
+import asyncio
+import pickle
+from dataclasses import fields, replace
+from itertools import islice
+
+import pytest
+from lineloom_core.mapping.site_mapper import SiteMapper
+from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.simulation import Fleet
+from lineloom_service.engine.local_engine import LocalEngine
+from lineloom_service.engine.view_parts import ViewDecoder, ViewEncoder
+
+
+@pytest.fixture(scope="module")
+def views() -> tuple[SiteView, SiteView]:
+    """A site, and the same as the robot has driven on through it."""
+    mapper = SiteMapper()
+    scans = Fleet.office(seed=4, robots=1).scans()
+    for seen in islice(scans, 120):
+        mapper.add("r", seen.scan)
+    before = mapper.view()
+    for seen in islice(scans, 60):
+        mapper.add("r", seen.scan)
+    return before, mapper.view()
+
+
+def _written(view: SiteView) -> dict[str, list[bytes]]:
+    """Every part to the last bit; as one piece, pickle would tell shared parts from equal ones."""
+    values = {field.name: getattr(view, field.name) for field in fields(view)}
+    return {
+        name: [pickle.dumps(part) for part in (value if isinstance(value, tuple) else [value])]
+        for name, value in values.items()
+    }
+
+
+def _travelled(view: SiteView, encoder: ViewEncoder, decoder: ViewDecoder) -> SiteView:
+    return decoder.decode(pickle.loads(pickle.dumps(encoder.encode(view))))
+
+
+def test_every_view_arrives_whole(views: tuple[SiteView, SiteView]) -> None:
+    encoder, decoder = ViewEncoder(), ViewDecoder()
+    before, after = views
+    assert before.lines
+    assert len(after.keyframes) > len(before.keyframes)
+    shrunk = replace(after, lines=after.lines[::-2], constraints=())
+    for view in (before, after, shrunk, before, after):
+        assert _written(_travelled(view, encoder, decoder)) == _written(view)
+
+
+def test_what_has_not_changed_is_not_sent_again_and_stays_the_same_object(
+    views: tuple[SiteView, SiteView],
+) -> None:
+    encoder, decoder = ViewEncoder(), ViewDecoder()
+    first = _travelled(views[0], encoder, decoder)
+    moved = replace(views[0].lines[1], x1=99.0)
+    lines = (views[0].lines[0], moved, *views[0].lines[2:])
+    parts = encoder.encode(replace(views[0], lines=lines))
+    assert len(parts.new) == 1
+    second = decoder.decode(parts)
+    assert second.lines[1] == moved
+    assert all(
+        one is other
+        for name in ("lines", "keyframes", "constraints", "submaps")
+        for one, other in zip(getattr(first, name), getattr(second, name), strict=True)
+        if other is not second.lines[1]
+    )
+
+
+def test_what_is_gone_is_kept_at_neither_end(views: tuple[SiteView, SiteView]) -> None:
+    encoder, decoder = ViewEncoder(), ViewDecoder()
+    emptied = replace(views[0], lines=(), keyframes=(), constraints=(), submaps=())
+    for view in (views[0], emptied):
+        _travelled(view, encoder, decoder)
+    again = encoder.encode(views[0])
+    assert len(again.new) == sum(len(numbers) for numbers in again.numbers.values())
+    assert _written(decoder.decode(again)) == _written(views[0])
+
+
+async def test_of_a_site_that_is_stopped_nothing_is_kept() -> None:
+    engine = LocalEngine(1, mapper="fake_mapper:FakeMapper", warm_up=None)
+    seen = asyncio.Event()
+    engine.subscribe(lambda *_: seen.set())
+    await engine.start()
+    try:
+        await engine.start_site(7, 0, None)
+        await seen.wait()
+        (process,) = [slot.process for slot in engine._slots]
+        assert process is not None
+        assert list(process._decoders) == [7]
+        engine.stop_site(7)
+        async with asyncio.timeout(60.0):
+            while process._decoders:
+                await asyncio.sleep(0.01)
+    finally:
+        await engine.stop()
