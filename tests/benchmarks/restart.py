@@ -64,7 +64,7 @@ def drive(service: ChildService, count: int, lidar: Lidar) -> int:
         for robot in fleet.robots:
             own = [one.scan for one in seen if one.robot == robot.name]
             client.post_scans(SITE, robot.name, own, batch=200)
-        return client.wait_until_idle(SITE).version
+        return client.wait_until_idle(SITE, 3600.0).version
 
 
 def kill(service: ChildService) -> None:

@@ -88,11 +88,12 @@ class FakeServer:
             return {"sites": [site.site()] if self.exists else []}
 
         @router.get(f"{_SITE}/map")
-        def line_map(request: Request) -> Response:
+        def line_map(request: Request, since: int | None = None) -> Response:
             etag = f'"{site.version}"'
             if request.headers.get("If-None-Match") == etag:
                 return Response(status_code=304, headers={"ETag": etag})
-            return JSONResponse(site.map(), headers={"ETag": etag})
+            answer = site.map() if since is None else site.changes(since)
+            return JSONResponse(answer, headers={"ETag": etag})
 
         @router.get(f"{_SITE}/constraints")
         def constraints(kind: str) -> Any:

@@ -76,6 +76,10 @@ class FakeSite:
         components = [{"id": c["id"], "robots": c["robots"]} for c in self._components()]
         return {"site": SITE, "version": self.version, "components": components, "lines": lines}
 
+    def changes(self, since: int) -> dict[str, Any]:
+        """`GET …/map?since=`: the whole map, as from a service that has just begun."""
+        return self.map() | {"full": True, "since": since, "removed": []}
+
     def robots(self) -> dict[str, Any]:
         """`GET …/robots`."""
         robots = [self._robot("ada", "c0"), self._robot("bob", "c1")]

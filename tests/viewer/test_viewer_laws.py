@@ -207,7 +207,8 @@ def test_changes_make_the_same_map_as_the_whole(run: Run) -> None:
     found = run(
         "net/map_copy.js",
         """
-        const line = (i, support) => ({ id: `l${i}`, support });
+        const ends = { x1: 0, y1: 0, x2: 1, y2: 0 };
+        const line = (i, support) => ({ id: `l${i}`, component: "c0", robots: [], support, ...ends });
         const first = Array.from({ length: 3000 }, (_, i) => line(i, 1));
         const second = [...first.slice(10), line(5000, 1)];
         second[0] = line(10, 7);
@@ -223,11 +224,59 @@ def test_changes_make_the_same_map_as_the_whole(run: Run) -> None:
             },
         };
         const copy = new m.MapCopy(api, "map");
-        await copy.current();
-        const now = await copy.current();
+        const current = async () => copy.take(await copy.news(), []).map;
+        await current();
+        const now = await current();
         copy.forget();
-        await copy.current();
-        return [asked, now.version, JSON.stringify(now.lines) === JSON.stringify(second)];
+        await current();
+        const byId = (lines) => JSON.stringify([...lines].sort((a, b) => (a.id < b.id ? -1 : 1)));
+        return [asked, now.version, byId(now.lines) === byId(second)];
         """,
     )
     assert found == [["map", "map?since=4", "map"], 9, True]
+
+
+def test_a_line_set_that_was_brought_up_to_date_is_one_made_anew(run: Run) -> None:
+    """Whatever came, changed and went, and also where the robots' numbers change."""
+    differences = run(
+        "data/line_set.js",
+        """
+        const whole = (low, high) => Math.floor(random(low, high));
+        const made = (id) => ({
+            id, component: `c${whole(0, 3)}`, support: whole(1, 12),
+            robots: [["ada"], ["bob"], ["ada", "bob"], ["cyd"]][whole(0, 4)],
+            x1: random(-9, 9), y1: random(-9, 9), x2: random(-9, 9), y2: random(-9, 9),
+        });
+        const row = (set, i) => [set.answers[i].id, ...set.ends.subarray(4 * i, 4 * i + 4)].join();
+        const looks = (set) => set.groups.map(({ component, robot, step, start, end }) => [
+            component, robot, step,
+            Array.from({ length: end - start }, (_, i) => row(set, start + i)).sort().join("; "),
+        ].join(" ")).sort();
+        const bounds = (set) => JSON.stringify([...set.bounds].sort());
+        const differences = [];
+        let lines = new Map(Array.from({ length: 300 }, (_, i) => [`l${i}`, made(`l${i}`)]));
+        let robots = ["ada", "bob"];
+        let set = m.LineSet.of([...lines.values()], robots);
+        for (let round = 0; round < 40; round++) {
+            if (round === 20) robots = ["ada", "ann", "bob", "cyd"];
+            const names = [...lines.keys()].filter(() => random(0, 1) < 0.1);
+            const [removed, moved] = [names.filter((_, i) => i % 3 === 0), names.filter((_, i) => i % 3)];
+            const fresh = Array.from({ length: whole(0, 20) }, (_, i) => `l${1000 * (round + 1) + i}`);
+            const changed = [...moved, ...fresh].map(made);
+            const out = new Map(names.map((name) => [name, lines.get(name)]));
+            const before = set;
+            set = set.updated(changed, out, robots);
+            for (const name of removed) lines.delete(name);
+            for (const line of changed) lines.set(line.id, line);
+            const anew = m.LineSet.of([...lines.values()], robots);
+            const arrived = set.predecessor === before.serial ? set.arrived.map((l) => l.id) : fresh;
+            if (looks(set).join("|") !== looks(anew).join("|")) differences.push(`${round} looks`);
+            if (bounds(set) !== bounds(anew)) differences.push(`${round} bounds`);
+            if (arrived.sort().join() !== fresh.sort().join()) differences.push(`${round} arrived`);
+            if (set.indexOf(changed[0]?.id) !== set.answers.indexOf(changed[0])) differences.push("index");
+            if (removed.some((name) => set.indexOf(name) !== -1)) differences.push(`${round} removed`);
+        }
+        return differences;
+        """,
+    )
+    assert differences == []

@@ -16,16 +16,17 @@ export class SiteState {
    *   robots: import("../net/contract.js").RobotAnswer[],
    *   graph: import("../net/contract.js").GraphAnswer,
    *   constraints: ConstraintAnswer[]}} answers
+   * @param {LineSet} [lines] those of the map, where they are there already
    */
-  constructor({ site, map, robots, graph, constraints }) {
+  constructor({ site, map, robots, graph, constraints }, lines) {
     this.answers = { site, map, robots, graph, constraints };
     this.site = site;
     this.version = map.version;
     this.receivedAt = Date.now();
     /** Names in the order of their colours: the same as in the service's own pictures. */
-    this.robotNames = [...new Set([...site.robots, ...robots.map((r) => r.robot)])].sort();
+    this.robotNames = robotNamesOf(site, robots);
     this.robots = [...robots].sort((a, b) => (a.robot < b.robot ? -1 : 1));
-    this.lines = new LineSet(map.lines, this.robotNames);
+    this.lines = lines ?? LineSet.of(map.lines, this.robotNames);
     /** @type {Map<number, Keyframe>} */
     this.keyframes = new Map(graph.nodes.map((node) => [node.id, node]));
     /** @type {Map<string, ConstraintAnswer>} */
@@ -51,6 +52,11 @@ export class SiteState {
     while (this.site.merged_into[current] !== undefined) current = this.site.merged_into[current];
     return current;
   }
+}
+
+/** Return all names, sorted. @param {import("../net/contract.js").SiteAnswer} site @param {import("../net/contract.js").RobotAnswer[]} robots */
+export function robotNamesOf(site, robots) {
+  return [...new Set([...site.robots, ...robots.map((r) => r.robot)])].sort();
 }
 
 /**

@@ -1,4 +1,4 @@
-import { SiteState } from "../data/site_state.js";
+import { robotNamesOf, SiteState } from "../data/site_state.js";
 import { MapCopy } from "./map_copy.js";
 
 const PAGE = 1000;
@@ -34,18 +34,19 @@ export class SiteReader {
   async state() {
     let answers = await this._answers();
     if (!agree(answers)) answers = await this._answers();
-    return new SiteState(answers);
+    return new SiteState(answers, answers.lines);
   }
 
   async _answers() {
-    const [site, map, robots, graph, constraints] = await Promise.all([
+    const [site, news, robots, graph, constraints] = await Promise.all([
       this.site(),
-      this._map.current(),
+      this._map.news(),
       this.robots(),
       this._api.get(`${this._path}/graph`),
       this._constraints(),
     ]);
-    return { site, map, robots, graph, constraints };
+    const { map, lines } = this._map.take(news, robotNamesOf(site, robots));
+    return { site, map, lines, robots, graph, constraints };
   }
 
   /** Return loops and rendezvous; tracked steps are drawn as trajectories. @returns {Promise<import("./contract.js").ConstraintAnswer[]>} */
