@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lineloom_core.features import ExtractionConfig, ScanFeatures, extract_features
+from lineloom_core.features._kernels import VAR_OFFSET
 from lineloom_core.geometry import Pose
 from lineloom_core.matching.local_map import Cloud
 from lineloom_core.scan import Scan
+
+_DERIVED_KEPT = 2048
+"""Keyframes whose features and points stay in memory; another one's are made in 0.1 ms."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +42,8 @@ class Keyframe:
     break that it belongs to. T_track_laser: where the tracker put it; the graph knows better.
     step: None for the first of a track. version: number of the log entry that brought it.
     trusted: False where its lidar's geometry is certainly wrong: no place is made of it.
-    Features and cloud are functions of the scan; a snapshot leaves them out.
+    Features and cloud are functions of the scan: kept for the keyframes used last, made anew for
+    the others.
     """
 
     id: int
@@ -52,17 +57,30 @@ class Keyframe:
     trusted: bool = True
 
     @cached_property
-    def features(self) -> ScanFeatures:
-        """Lines, ends, edges and points of the scan."""
-        return extract_features(self.scan, self.extraction)
-
-    @cached_property
-    def cloud(self) -> Cloud:
-        """The points with normals, for registration."""
-        return Cloud.of(self.features)
+    def segments(self) -> NDArray[np.float64]:
+        """Its lines as the map takes them: ends x1, y1, x2, y2 and sigma [m], shape (n, 5)."""
+        lines = self.features.lines
+        return np.column_stack([lines[:, :4], np.sqrt(lines[:, VAR_OFFSET])])
 
     def __getstate__(self) -> dict[str, Any]:
-        state = dict(self.__dict__)
-        state.pop("features", None)
-        state.pop("cloud", None)
-        return state
+        return {name: value for name, value in self.__dict__.items() if name != "segments"}
+
+    @property
+    def features(self) -> ScanFeatures:
+        """Lines, ends, edges and points of the scan."""
+        return _features(self)
+
+    @property
+    def cloud(self) -> Cloud:
+        """The points with normals, for registration."""
+        return _cloud(self)
+
+
+@lru_cache(maxsize=_DERIVED_KEPT)
+def _features(keyframe: Keyframe) -> ScanFeatures:
+    return extract_features(keyframe.scan, keyframe.extraction)
+
+
+@lru_cache(maxsize=_DERIVED_KEPT)
+def _cloud(keyframe: Keyframe) -> Cloud:
+    return Cloud.of(keyframe.features)

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from lineloom_core.features._kernels import VAR_OFFSET
 from lineloom_core.fusion import FusedLines, LineObservations, fuse
 from lineloom_core.fusion.persistence import Stretch, lasting_stretches
 from lineloom_core.geometry import Pose
@@ -102,29 +101,29 @@ def _part_of_line(
 
 def _observations(site: SiteMap, keyframes: list[int], names: list[str]) -> LineObservations:
     """All keyframes' lines in the component's frame."""
-    rows = [(k, site.keyframes[k], site.keyframes[k].features.lines) for k in keyframes]
-    counts = np.array([len(lines) for _, _, lines in rows])
+    rows = [(k, site.keyframes[k], site.keyframes[k].segments) for k in keyframes]
+    counts = np.array([len(segments) for _, _, segments in rows])
     number = {name: i for i, name in enumerate(names)}
     return LineObservations(
-        endpoints=np.concatenate([_moved(site.pose(k), lines) for k, _, lines in rows]),
-        sigma=np.sqrt(np.concatenate([lines[:, VAR_OFFSET] for _, _, lines in rows])),
+        endpoints=np.concatenate([_moved(site.pose(k), segments) for k, _, segments in rows]),
+        sigma=np.concatenate([segments[:, 4] for _, _, segments in rows]),
         weight=np.ones(int(counts.sum())),
         keyframe=np.repeat(np.array([k for k, _, _ in rows], dtype=np.int64), counts),
         robot=np.repeat(np.array([number[f.robot] for _, f, _ in rows], dtype=np.int64), counts),
         stamp=np.repeat(np.array([f.scan.stamp for _, f, _ in rows]), counts),
         id=np.concatenate(
             [
-                k * _LINES_PER_KEYFRAME + np.arange(len(lines), dtype=np.int64)
-                for k, _, lines in rows
+                k * _LINES_PER_KEYFRAME + np.arange(len(segments), dtype=np.int64)
+                for k, _, segments in rows
             ]
         ),
     )
 
 
-def _moved(pose: Pose, lines: NDArray[np.float64]) -> NDArray[np.float64]:
+def _moved(pose: Pose, segments: NDArray[np.float64]) -> NDArray[np.float64]:
     c, s = math.cos(pose.theta), math.sin(pose.theta)
-    x, y = lines[:, 0:4:2], lines[:, 1:4:2]
-    moved = np.empty((len(lines), 4))
+    x, y = segments[:, 0:4:2], segments[:, 1:4:2]
+    moved = np.empty((len(segments), 4))
     moved[:, 0:4:2] = c * x - s * y + pose.x
     moved[:, 1:4:2] = s * x + c * y + pose.y
     return moved

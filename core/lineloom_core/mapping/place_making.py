@@ -32,9 +32,8 @@ def make_place(members: Sequence[int], keyframes: Mapping[int, Keyframe]) -> Pla
     its last keyframe: the same however often the history is gone through.
     """
     anchor = keyframes[members[len(members) // 2]]
-    glimpses = []
-    for k in members:
-        frame = keyframes[k]
-        T_anchor_laser = anchor.T_track_laser.between(frame.T_track_laser)
-        glimpses.append(Glimpse(k, frame.features, frame.cloud, T_anchor_laser))
-    return Place.of(members[-1], anchor.track, anchor.id, glimpses)
+    frames = [keyframes[k] for k in members]
+    glimpses = tuple(
+        Glimpse(f.id, f, anchor.T_track_laser.between(f.T_track_laser)) for f in frames
+    )
+    return Place(members[-1], anchor.track, anchor.id, glimpses)

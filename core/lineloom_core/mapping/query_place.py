@@ -9,7 +9,7 @@ from lineloom_core.geometry import Pose
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.tracker import Tracker
 from lineloom_core.matching.local_map import Cloud
-from lineloom_core.places import Glimpse, Place
+from lineloom_core.places import Glimpse, Place, Seen
 from lineloom_core.scan import Scan
 
 
@@ -31,15 +31,15 @@ def query_place(scans: Sequence[Scan], config: MapperConfig) -> Place | None:
             tracker, seen = Tracker(config.tracker), []
             tracked = tracker.track(features, cloud, scan.stamp, scan.odometry)
         if tracked.pose is not None:
-            seen.append((Glimpse(number, features, cloud, tracked.pose), tracked.is_keyframe))
+            seen.append((Glimpse(number, Seen(features, cloud), tracked.pose), tracked.is_keyframe))
     if not seen:
         return None
     members = _members(seen, config)
     latest = members[-1].T_anchor_laser
-    glimpses = [
-        Glimpse(g.keyframe, g.features, g.cloud, latest.between(g.T_anchor_laser)) for g in members
-    ]
-    return Place.of(-1, -1, glimpses[-1].keyframe, glimpses)
+    glimpses = tuple(
+        Glimpse(g.keyframe, g.sight, latest.between(g.T_anchor_laser)) for g in members
+    )
+    return Place(-1, -1, glimpses[-1].keyframe, glimpses)
 
 
 def _members(seen: list[tuple[Glimpse, bool]], config: MapperConfig) -> list[Glimpse]:

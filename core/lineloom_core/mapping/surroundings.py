@@ -25,11 +25,8 @@ def surroundings(
         if all(_adds(site.pose(k), site.pose(c)) for c in chosen):
             chosen.append(k)
     anchor = site.pose(chosen[0])
-    glimpses = []
-    for k in chosen:
-        frame = site.keyframes[k]
-        glimpses.append(Glimpse(k, frame.features, frame.cloud, anchor.between(site.pose(k))))
-    return Place.of(-1, -1, chosen[0], glimpses), anchor
+    glimpses = tuple(Glimpse(k, site.keyframes[k], anchor.between(site.pose(k))) for k in chosen)
+    return Place(-1, -1, chosen[0], glimpses), anchor
 
 
 def _adds(pose: Pose, other: Pose) -> bool:

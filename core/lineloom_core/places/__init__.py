@@ -4,6 +4,8 @@ from lineloom_core.places.index import PlaceIndex
 from lineloom_core.places.place import (
     Glimpse,
     Place,
+    Seen,
+    Sight,
     conflicting_points,
     count_points,
     count_steady,
@@ -27,6 +29,8 @@ __all__ = [
     "PlaceIndex",
     "Recognition",
     "RecognitionConfig",
+    "Seen",
+    "Sight",
     "check_alignment",
     "conflicting_points",
     "count_points",

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,31 +29,43 @@ from lineloom_core.places import _kernels
 _CORNER_REACH = 0.15
 
 
+_BODIES_KEPT = 384
+"""Places whose arrays stay in memory, about 0.15 MB each; another one's are made in 1 ms."""
+
+
+class Sight(Protocol):
+    """A scan as a place takes it: a keyframe, or `Seen`."""
+
+    @property
+    def features(self) -> ScanFeatures:
+        """Its lines, ends, edges and ranges."""
+
+    @property
+    def cloud(self) -> Cloud:
+        """Its points with normals."""
+
+
 @dataclass(frozen=True, eq=False)
+class Seen:
+    """A scan that is no keyframe."""
+
+    features: ScanFeatures
+    cloud: Cloud
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class Glimpse:
     """One keyframe's contribution to a place: what it saw and where it stood."""
 
     keyframe: int
-    features: ScanFeatures
-    cloud: Cloud
+    sight: Sight
     T_anchor_laser: Pose
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
-    """A submap, all in the frame of its anchor keyframe.
+class Body:
+    """The arrays of a place (see there): a function of its glimpses."""
 
-    lines (n, 12), ends (n, 2), edges (n, 2, 2): fused oriented lines as `ScanFeatures` has them.
-    surface: the averaged points as a cloud; local_map: the same, to register against.
-    ranges (k, b), angle_mins, angle_increments (k,), sweep_poses (k, 3): the sweeps for
-    free-space checks, padded with NaN.
-    """
-
-    id: int
-    track: int
-    anchor: int
-    keyframes: tuple[int, ...]
-    poses: tuple[Pose, ...]
     lines: NDArray[np.float64]
     ends: NDArray[np.int64]
     edges: NDArray[np.float64]
@@ -64,49 +77,120 @@ class Place:
     sweep_poses: NDArray[np.float64]
 
     @cached_property
-    def own_conflict(self) -> float:
-        """Share of the place's own points in its own free space: clutter, people, drift inside."""
-        matched, conflict = count_points(self, self, Pose.identity())
-        return conflict / max(matched + conflict, 1.0)
-
-    @cached_property
     def steady(self) -> NDArray[np.bool_]:
-        """Which surface points stood still, shape (n,): seen twice, and hardly ever seen through.
-
-        People walk and doors move while a robot passes; walls, furniture and columns do not.
-        """
+        """See `Place.steady`."""
         tally = _tally(self, self.surface.points, Pose.identity())
         hits, misses = tally[:, 0], tally[:, 1]
         still: NDArray[np.bool_] = (hits >= 2) & (misses <= 0.25 * hits)
         return still
 
-    @staticmethod
-    def of(id: int, track: int, anchor: int, glimpses: Sequence[Glimpse]) -> Place:
-        """Fuse the glimpses of consecutive keyframes of one track."""
-        local_map = LocalMap.build(
-            ((g.cloud, g.T_anchor_laser) for g in glimpses), reach=20.0, searchable=False
-        )
-        lines, ends, edges = _fuse_lines(glimpses)
-        beams = max(len(g.features.ranges) for g in glimpses)
-        ranges = np.full((len(glimpses), beams), np.nan)
-        for k, g in enumerate(glimpses):
-            ranges[k, : len(g.features.ranges)] = g.features.ranges
-        return Place(
-            id=id,
-            track=track,
-            anchor=anchor,
-            keyframes=tuple(g.keyframe for g in glimpses),
-            poses=tuple(g.T_anchor_laser for g in glimpses),
-            lines=lines,
-            ends=ends,
-            edges=edges,
-            surface=_surface_cloud(local_map),
-            local_map=local_map,
-            ranges=ranges,
-            angle_mins=np.array([g.features.angle_min for g in glimpses]),
-            angle_increments=np.array([g.features.angle_increment for g in glimpses]),
-            sweep_poses=np.array([g.T_anchor_laser.to_array() for g in glimpses]),
-        )
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A submap, all in the frame of its anchor keyframe: the glimpses of consecutive keyframes.
+
+    Its arrays are made when they are asked for, and kept for the places used last: a building has
+    many more places than are compared at a time.
+    """
+
+    id: int
+    track: int
+    anchor: int
+    glimpses: tuple[Glimpse, ...]
+
+    @property
+    def keyframes(self) -> tuple[int, ...]:
+        """Ids of its keyframes, in their order."""
+        return tuple(g.keyframe for g in self.glimpses)
+
+    @property
+    def poses(self) -> tuple[Pose, ...]:
+        """T_anchor_laser of its keyframes."""
+        return tuple(g.T_anchor_laser for g in self.glimpses)
+
+    @property
+    def lines(self) -> NDArray[np.float64]:
+        """Fused oriented lines as `ScanFeatures` has them, shape (n, 12)."""
+        return _body(self).lines
+
+    @property
+    def ends(self) -> NDArray[np.int64]:
+        """What their ends are, as `ScanFeatures` has it, shape (n, 2)."""
+        return _body(self).ends
+
+    @property
+    def edges(self) -> NDArray[np.float64]:
+        """Where the corners at their ends are, shape (n, 2, 2)."""
+        return _body(self).edges
+
+    @property
+    def surface(self) -> Cloud:
+        """The averaged points."""
+        return _body(self).surface
+
+    @property
+    def local_map(self) -> LocalMap:
+        """The averaged points, to register against."""
+        return _body(self).local_map
+
+    @property
+    def ranges(self) -> NDArray[np.float64]:
+        """The sweeps for free-space checks, shape (k, b), padded with NaN."""
+        return _body(self).ranges
+
+    @property
+    def angle_mins(self) -> NDArray[np.float64]:
+        """Angle of the sweeps' first beams [rad], shape (k,)."""
+        return _body(self).angle_mins
+
+    @property
+    def angle_increments(self) -> NDArray[np.float64]:
+        """Angle between the sweeps' beams [rad], shape (k,)."""
+        return _body(self).angle_increments
+
+    @property
+    def sweep_poses(self) -> NDArray[np.float64]:
+        """Where the sweeps were taken: x, y, theta, shape (k, 3)."""
+        return _body(self).sweep_poses
+
+    @property
+    def steady(self) -> NDArray[np.bool_]:
+        """Which surface points stood still, shape (n,): seen twice, and hardly ever seen through.
+
+        People walk and doors move while a robot passes; walls, furniture and columns do not.
+        """
+        return _body(self).steady
+
+    @cached_property
+    def own_conflict(self) -> float:
+        """Share of the place's own points in its own free space: clutter, people, drift inside."""
+        matched, conflict = count_points(self, self, Pose.identity())
+        return conflict / max(matched + conflict, 1.0)
+
+
+@lru_cache(maxsize=_BODIES_KEPT)
+def _body(place: Place) -> Body:
+    """Fuse a place's glimpses."""
+    sights = [(g.sight, g.T_anchor_laser) for g in place.glimpses]
+    features = [sight.features for sight, _ in sights]
+    local_map = LocalMap.build(
+        ((sight.cloud, T) for sight, T in sights), reach=20.0, searchable=False
+    )
+    lines, ends, edges = _fuse_lines(place.glimpses)
+    ranges = np.full((len(features), max(len(f.ranges) for f in features)), np.nan)
+    for k, f in enumerate(features):
+        ranges[k, : len(f.ranges)] = f.ranges
+    return Body(
+        lines=lines,
+        ends=ends,
+        edges=edges,
+        surface=_surface_cloud(local_map),
+        local_map=local_map,
+        ranges=ranges,
+        angle_mins=np.array([f.angle_min for f in features]),
+        angle_increments=np.array([f.angle_increment for f in features]),
+        sweep_poses=np.array([T.to_array() for _, T in sights]),
+    )
 
 
 def count_points(
@@ -150,7 +234,9 @@ def count_steady(reference: Place, current: Place, T_reference_current: Pose) ->
     return int(matched), int(np.count_nonzero((misses >= 2) & (misses >= 3 * hits)))
 
 
-def _tally(place: Place, points: NDArray[np.float64], T_place_points: Pose) -> NDArray[np.float64]:
+def _tally(
+    place: Place | Body, points: NDArray[np.float64], T_place_points: Pose
+) -> NDArray[np.float64]:
     """Sweeps of the place that measured each point and that saw through it, shape (n, 2)."""
     out = np.empty((len(points), 2))
     _kernels.tally_sweeps(
@@ -192,7 +278,7 @@ def _fuse_lines(
     segments, sigmas, keyframes = [], [], []
     corners: tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]] = ([], [])
     for g in glimpses:
-        f = g.features
+        f = g.sight.features
         ends = g.T_anchor_laser.transform(f.lines[:, :4].reshape(-1, 2)).reshape(-1, 4)
         segments.append(ends)
         sigmas.append(np.sqrt(f.lines[:, VAR_OFFSET]))

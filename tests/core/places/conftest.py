@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from lineloom_core.features import extract_features
 from lineloom_core.geometry import Pose
 from lineloom_core.matching.local_map import Cloud
-from lineloom_core.places import Glimpse, Place
+from lineloom_core.places import Glimpse, Place, Seen
 from lineloom_core.simulation import (
     Drive,
     FreeSpace,
@@ -59,7 +59,7 @@ class PlaceMaker:
     def glimpses(self, poses: list[Pose], anchor: Pose) -> list[Glimpse]:
         seen = [extract_features(self.lidar.scan(self.world, pose, self.rng)) for pose in poses]
         return [
-            Glimpse(k, f, Cloud.of(f), anchor.between(pose))
+            Glimpse(k, Seen(f, Cloud.of(f)), anchor.between(pose))
             for k, (f, pose) in enumerate(zip(seen, poses, strict=True))
         ]
 
@@ -67,7 +67,7 @@ class PlaceMaker:
         poses = self.poses(path, length)
         anchor = poses[len(poses) // 2]
         self.count += 1
-        return Made(Place.of(self.count, 1, 0, self.glimpses(poses, anchor)), anchor)
+        return Made(Place(self.count, 1, 0, tuple(self.glimpses(poses, anchor))), anchor)
 
     def stretch(self, path: ArrayLike) -> Stretch:
         backwards = np.asarray(path)[::-1]
@@ -100,3 +100,16 @@ def full_turn_stretches() -> list[Stretch]:
 def stretches(request: pytest.FixtureRequest) -> list[Stretch]:
     found: list[Stretch] = request.getfixturevalue(f"{request.param}_turn_stretches")
     return found
+
+
+def of_one_line(place: Place) -> Place:
+    """The same points, but a single line in them."""
+    first, *others = place.glimpses
+    glimpses = (_with_lines(first, 1), *(_with_lines(g, 0) for g in others))
+    return replace(place, id=-1 - place.id, glimpses=glimpses)
+
+
+def _with_lines(glimpse: Glimpse, count: int) -> Glimpse:
+    f = glimpse.sight.features
+    fewer = replace(f, lines=f.lines[:count], ends=f.ends[:count], edges=f.edges[:count])
+    return replace(glimpse, sight=Seen(fewer, glimpse.sight.cloud))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import pickle
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from lineloom_core.places import _index_kernels as kernels
 from lineloom_core.simulation import sick_lms200
 from numpy.typing import NDArray
 
-from tests.core.places.conftest import Stretch, office_stretches
+from tests.core.places.conftest import Stretch, of_one_line, office_stretches
 
 Array = NDArray[np.float64]
 
@@ -107,9 +106,7 @@ def test_a_shortlist_keeps_the_order_and_all_where_there_are_few(many: list[Stre
 
 def test_a_place_without_corners_is_like_nothing(many: list[Stretch]) -> None:
     whole: Place = many[0].forth.place
-    bare = replace(
-        whole, keyframes=(-5,), lines=whole.lines[:1], ends=whole.ends[:1], edges=whole.edges[:1]
-    )
+    bare = of_one_line(whole)
     index = PlaceIndex()
     assert index.likeness(bare, [whole]).tolist() == [0.0]
     assert index.likeness(whole, [bare]).tolist() == [0.0]

@@ -32,7 +32,7 @@ def test_a_room_becomes_its_four_walls_with_their_corners(
     room: tuple[list[Glimpse], Pose],
 ) -> None:
     glimpses, anchor = room
-    place = Place.of(5, 2, 7, glimpses)
+    place = Place(5, 2, 7, tuple(glimpses))
     assert (place.id, place.track, place.anchor) == (5, 2, 7)
     assert len(place.lines) == 4
     assert np.all(place.ends == EDGE)
@@ -74,7 +74,7 @@ def distance_to_walls(
 
 def test_lines_and_surface_lie_on_the_true_walls(room: tuple[list[Glimpse], Pose]) -> None:
     glimpses, anchor = room
-    place = Place.of(0, 0, 0, glimpses)
+    place = Place(0, 0, 0, tuple(glimpses))
     walls = rectangle(8.0, 5.0).walls
     middles = 0.5 * (place.lines[:, :2] + place.lines[:, 2:4])
     assert distance_to_walls(anchor.transform(middles), walls).max() < 0.01
@@ -87,7 +87,7 @@ def test_normals_and_lines_face_the_side_where_the_robot_was(
     room: tuple[list[Glimpse], Pose],
 ) -> None:
     glimpses, _ = room
-    place = Place.of(0, 0, 0, glimpses)
+    place = Place(0, 0, 0, tuple(glimpses))
     assert np.all(place.lines[:, OFFSET] < 0.0)  # the anchor itself is in the room
     inward = np.einsum("ij,ij->i", place.surface.normals, -place.surface.points)
     assert np.mean(inward > 0.0) > 0.95
@@ -99,8 +99,8 @@ def test_another_anchor_is_another_frame_and_nothing_else(
 ) -> None:
     glimpses, _ = room
     T = Pose(3.0, -1.0, 0.8)
-    place = Place.of(0, 0, 0, glimpses)
-    moved = Place.of(0, 0, 0, [replace(g, T_anchor_laser=T @ g.T_anchor_laser) for g in glimpses])
+    place = Place(0, 0, 0, tuple(glimpses))
+    moved = Place(0, 0, 0, tuple(replace(g, T_anchor_laser=T @ g.T_anchor_laser) for g in glimpses))
     expected = T.transform(place.lines[:, :4].reshape(-1, 2)).reshape(-1, 4)
     for row in moved.lines:
         k = int(np.argmin(np.abs(expected - row[:4]).sum(axis=1)))
@@ -113,10 +113,10 @@ def test_sweeps_of_different_lidars_share_a_table(room: tuple[list[Glimpse], Pos
     glimpses, anchor = room
     sparse = PlaceMaker(rectangle(8.0, 5.0), sick_lms200(), 2)
     more = sparse.glimpses([anchor @ Pose(0.3, 0.1, 0.2)], anchor)
-    place = Place.of(0, 0, 0, [*glimpses[:1], *more])
+    place = Place(0, 0, 0, (*glimpses[:1], *more))
     assert place.ranges.shape == (2, 1080)
-    np.testing.assert_array_equal(place.ranges[0], glimpses[0].features.ranges)
-    np.testing.assert_array_equal(place.ranges[1, :181], more[0].features.ranges)
+    np.testing.assert_array_equal(place.ranges[0], glimpses[0].sight.features.ranges)
+    np.testing.assert_array_equal(place.ranges[1, :181], more[0].sight.features.ranges)
     assert np.all(np.isnan(place.ranges[1, 181:]))
     np.testing.assert_allclose(place.angle_increments, [math.tau / 1080, math.pi / 180])
     np.testing.assert_allclose(place.angle_mins, [-math.pi, -math.pi / 2])

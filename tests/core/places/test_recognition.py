@@ -22,7 +22,7 @@ from lineloom_core.simulation import (
     world_named,
 )
 
-from tests.core.places.conftest import Made, PlaceMaker, Stretch
+from tests.core.places.conftest import Made, PlaceMaker, Stretch, of_one_line
 
 AMBIGUOUS = "another hypothesis fits almost as well"
 
@@ -144,7 +144,7 @@ def test_a_plain_corridor_leaves_the_way_along_it_open(lidar: Lidar) -> None:
 
 def test_places_without_lines_are_refused(half_turn_stretches: list[Stretch]) -> None:
     place = half_turn_stretches[0].forth.place
-    bare = replace(place, lines=place.lines[:1], ends=place.ends[:1], edges=place.edges[:1])
+    bare = of_one_line(place)
     for pair in ((place, bare), (bare, place)):
         found = recognise(*pair)
         assert not found.plausible
@@ -181,7 +181,7 @@ def test_anchors_may_be_turned_at_will() -> None:
     glimpses = [maker.glimpses(poses, poses[5]) for _ in range(2)]
     T = Pose(1.0, -2.0, math.radians(100.0))
     moved = [replace(g, T_anchor_laser=T @ g.T_anchor_laser) for g in glimpses[1]]
-    ref, cur, turned = (Place.of(0, 0, 0, seen) for seen in (*glimpses, moved))
+    ref, cur, turned = (Place(0, 0, 0, tuple(seen)) for seen in (*glimpses, moved))
     for found, truth in (
         (recognise(ref, cur), Pose.identity()),
         (recognise(ref, turned), T.inverse()),
