@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -26,6 +27,11 @@ class GrowingArray(Generic[_Scalar]):
             self._room = np.concatenate([self._room, np.empty_like(self._room)])
         self._room[self._count] = row
         self._count += 1
+
+    def keep(self, chosen: Sequence[bool]) -> None:
+        """Keep only the rows that are chosen, in their order."""
+        self._room = np.concatenate([self.rows[np.asarray(chosen, dtype=bool)], self._room[:16]])
+        self._count = sum(chosen)
 
     @property
     def rows(self) -> NDArray[_Scalar]:

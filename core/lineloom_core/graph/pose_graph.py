@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from types import MappingProxyType
 from typing import Any
 
@@ -103,10 +103,21 @@ class PoseGraph:
         if edge_id not in self._edges:
             raise KeyError(f"edge {edge_id} is not in the graph")
         edge = self._edges.pop(edge_id)
-        self._list_edges()
-        self._labels.rows[:] = labels(self._ids.rows, self._ends.rows)
-        self.changes += 1
+        self._relabel()
         return edge
+
+    def remove_nodes(self, nodes: Collection[int]) -> tuple[Edge, ...]:
+        """Remove nodes with all their edges; return those. Raises KeyError for an unknown node."""
+        gone = frozenset(nodes)
+        removed = {edge.id: edge for node in nodes for edge in self._edges_at[node]}
+        kept = [node not in gone for node in self._row_of]
+        self._ids.keep(kept)
+        self._poses.keep(kept)
+        self._labels.keep(kept)
+        self._row_of = {node: row for row, node in enumerate(self._ids.rows.tolist())}
+        self._edges = {name: edge for name, edge in self._edges.items() if name not in removed}
+        self._relabel()
+        return tuple(removed.values())
 
     def edges_at(self, node: int) -> tuple[Edge, ...]:
         """Return the edges that touch a node, in order of insertion."""
@@ -168,6 +179,11 @@ class PoseGraph:
         self._measured = GrowingArray(np.float64, (3,))
         self._information = GrowingArray(np.float64, (3, 3))
         self._robust = GrowingArray(np.bool_)
+
+    def _relabel(self) -> None:
+        self._list_edges()
+        self._labels.rows[:] = labels(self._ids.rows, self._ends.rows)
+        self.changes += 1
 
     def _list_edges(self) -> None:
         self._clear_edges()

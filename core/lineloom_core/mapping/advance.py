@@ -3,7 +3,8 @@
 Steps of `advance`: 1. the keyframe and its step enter the graph; 2. loops are closed with older
 keyframes that the graph says are near; 3. every few metres, a place is made of the last keyframes
 and looked for among all others; 4. sets of candidates that agree are believed, components joined
-and tied together where they run near each other; 5. what the new place contradicts is named.
+and tied together where they run near each other; 5. what the new place contradicts is named;
+6. else places are let go where more than enough show the same.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from lineloom_core.mapping.contradictions import contradicted_by
 from lineloom_core.mapping.keyframe import Keyframe
 from lineloom_core.mapping.place_making import place_is_due, recent_keyframes
 from lineloom_core.mapping.site_map import SiteMap
+from lineloom_core.mapping.thinning import thin
 from lineloom_core.mapping.track import Track
 from lineloom_core.places import Place
 
@@ -43,7 +45,10 @@ def advance(site: SiteMap, keyframe: Keyframe) -> Advance:
     merges, moved = consider(site, place)
     for merge in merges:
         _tie_after(site, merge)
-    return Advance(tuple(merges), optimised or moved, contradicted_by(site, place))
+    contradicted = contradicted_by(site, place)
+    if not contradicted:
+        thin(site, place)
+    return Advance(tuple(merges), optimised or moved, contradicted)
 
 
 def _close_loops(site: SiteMap, keyframe: int) -> bool:

@@ -88,7 +88,7 @@ def _register(site: SiteMap, older: int, newer: int) -> Constraint | None:
 def _clouds_around(site: SiteMap, keyframe: Keyframe) -> list[tuple[Cloud, Pose]]:
     T_keyframe_map = site.pose(keyframe.id).inverse()
     rows = []
-    for k in site.neighbours_on_track(keyframe.id, 3):
+    for k in site.track(keyframe.id).neighbours(keyframe.id, 3):
         T: Pose = T_keyframe_map @ site.pose(k)
         rows.append((site.keyframes[k].cloud, T))
     return rows

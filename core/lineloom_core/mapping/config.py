@@ -101,6 +101,20 @@ class DoubtConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class ThinningConfig:
+    """When places and their keyframes are let go.
+
+    most_alike: places kept within `radius` [m] and `angle` [rad] of each other. apart: metres that
+    a robot drives on before any of its latest track is let go.
+    """
+
+    most_alike: int = 3
+    radius: float = 2.5
+    angle: float = math.radians(60.0)
+    apart: float = 20.0
+
+
+@dataclass(frozen=True, slots=True)
 class MapperConfig:
     """Parameters of `SiteMapper`; the defaults are those that every figure was measured with."""
 
@@ -111,6 +125,7 @@ class MapperConfig:
     closure: ClosureConfig = field(default_factory=ClosureConfig)
     join: JoinConfig = field(default_factory=JoinConfig)
     doubt: DoubtConfig = field(default_factory=DoubtConfig)
+    thinning: ThinningConfig = field(default_factory=ThinningConfig)
     fusion: FusionConfig = field(default_factory=FusionConfig)
     persistence: PersistenceConfig = field(default_factory=PersistenceConfig)
     least_fit_late: float = 0.6

@@ -83,8 +83,10 @@ def _slip(
         return None
     steps = [
         site.constraints[step_id(k)]
-        for k in track.keyframes
-        if track.right_until < k <= place.id and step_id(k) not in site.verdicts.approved
+        for k in track.kept
+        if track.right_until < k <= place.id
+        and step_id(k) in site.constraints
+        and step_id(k) not in site.verdicts.approved
     ]
     if not steps:
         return None

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.mapping.answers import Evidence, MatchedLines, RunnerUp
 from lineloom_core.mapping.constraint import Constraint
+from lineloom_core.mapping.history import History
 from lineloom_core.mapping.limits import limits_of
 from lineloom_core.mapping.place_making import make_place
 from lineloom_core.mapping.site_map import SiteMap
@@ -25,10 +26,10 @@ _SAME_DISTANCE = 0.25  # m
 _LEAST_OVERLAP = 0.2  # m
 
 
-def explain(site: SiteMap, constraint: Constraint) -> Evidence:
+def explain(site: SiteMap, history: History, constraint: Constraint) -> Evidence:
     """What speaks for a constraint and against it."""
-    reference, T_a_reference = _seen_by(site, constraint.place_a, constraint.keyframe_a)
-    current, T_b_current = _seen_by(site, constraint.place_b, constraint.keyframe_b)
+    reference, T_a_reference = _seen_by(site, history, constraint.place_a, constraint.keyframe_a)
+    current, T_b_current = _seen_by(site, history, constraint.place_b, constraint.keyframe_b)
     T_a_current = constraint.T_a_b @ T_b_current
     lines_a, lines_b = _moved(T_a_reference, reference), _moved(T_a_current, current)
     T_reference_current = T_a_reference.between(T_a_current)
@@ -46,12 +47,15 @@ def explain(site: SiteMap, constraint: Constraint) -> Evidence:
     )
 
 
-def _seen_by(site: SiteMap, place: int, keyframe: int) -> tuple[Place, Pose]:
-    """The place of a recognition, else what the keyframe alone shows; and T_keyframe_place."""
+def _seen_by(site: SiteMap, history: History, place: int, keyframe: int) -> tuple[Place, Pose]:
+    """The place of a recognition, else what the keyframe alone shows; and T_keyframe_place.
+
+    The history is asked: what is barred may rest on keyframes that the map has let go.
+    """
     known = site.places.get(place)
     if known is not None and keyframe in known.keyframes:
         return known, known.poses[known.keyframes.index(keyframe)].inverse()
-    return make_place((keyframe,), site.keyframes), Pose.identity()
+    return make_place((keyframe,), history.keyframes), Pose.identity()
 
 
 def _moved(T: Pose, place: Place) -> NDArray[np.float64]:

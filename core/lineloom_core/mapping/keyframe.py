@@ -33,6 +33,26 @@ class Step:
     drift: NDArray[np.float64]
     checks: dict[str, float]
 
+    def then(self, following: Step) -> Step:
+        """Both steps as one; covariances are carried to its end, to first order."""
+        A = following.T_previous_this.inverse().adjoint()
+        covariance = A @ np.linalg.inv(self.information) @ A.T
+        information = np.linalg.inv(covariance + np.linalg.inv(following.information))
+        drift = A @ self.drift @ A.T + following.drift
+        return Step(
+            previous=self.previous,
+            T_previous_this=self.T_previous_this @ following.T_previous_this,
+            information=0.5 * (information + information.T),
+            drift=0.5 * (drift + drift.T),
+            checks=_worst(self.checks, following.checks),
+        )
+
+
+def _worst(a: dict[str, float], b: dict[str, float]) -> dict[str, float]:
+    """The lower fit and the higher of any other figure."""
+    pick = {"fit": min}
+    return {name: pick.get(name, max)(a[name], b[name]) for name in a if name in b}
+
 
 @dataclass(frozen=True, eq=False)
 class Keyframe:

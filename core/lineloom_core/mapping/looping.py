@@ -27,21 +27,28 @@ def close_loops(site: SiteMap, place: Place) -> bool:
         and site.component_root(c.keyframe_b) == root
     ]
     candidates = refuse_barred(site, candidates)
-    moved = False
-    for c in candidates:
-        agreeing = [o for o in candidates if o.id != c.id and _loops_agree(site, c, o)]
-        if _within_drift(site, c) and (agreeing or _small_step(site, c)):
-            ids = tuple(sorted([c.id, *(o.id for o in agreeing)]))
-            site.add_constraint(
-                c.moved_to(
-                    "accepted", "within the drift and confirmed", site.now, consistency_set=ids
-                )
-            )
-            moved = True
-    if moved:
+    # All are judged by the graph as it was: accepting one changes what the drift allows the next.
+    judged = [(c, _confirmed(site, c, candidates)) for c in candidates]
+    believed = [(c, agreeing) for c, agreeing in judged if agreeing is not None]
+    for c, agreeing in believed:
+        ids = tuple(sorted([c.id, *(o.id for o in agreeing)]))
+        site.add_constraint(
+            c.moved_to("accepted", "within the drift and confirmed", site.now, consistency_set=ids)
+        )
+    if believed:
         site.optimise(root)
         _drop_contradicted(site, [c.id for c in candidates], root)
-    return moved
+    return bool(believed)
+
+
+def _confirmed(
+    site: SiteMap, c: Constraint, candidates: list[Constraint]
+) -> list[Constraint] | None:
+    """The others that agree with a candidate; None where it is not to be believed."""
+    if not _within_drift(site, c):
+        return None
+    agreeing = [o for o in candidates if o.id != c.id and _loops_agree(site, c, o)]
+    return agreeing if agreeing or _small_step(site, c) else None
 
 
 def _correction(site: SiteMap, c: Constraint) -> Pose:

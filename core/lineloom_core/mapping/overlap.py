@@ -22,6 +22,7 @@ from lineloom_core.places import Place, count_steady, missing_share
 _GATE = 0.3  # m: how far registration may move a pair of places that drift has moved
 _SIGMA = 0.04
 _APART = 2  # places on: the next but one shares no keyframe
+_AT_MOST = 10.0  # m driven: farther on, places in between have been let go
 
 Count = tuple[int, int]
 """Steady points that both saw, and those that one should have seen and did not."""
@@ -122,6 +123,7 @@ def usual_missing(site: SiteMap, places: Iterable[Place]) -> float:
             count_steady_nearby(a, b, site.pose(a.anchor).between(site.pose(b.anchor)))
             for chain in by_track.values()
             for a, b in zip(chain, chain[_APART:], strict=False)
+            if site.driven_between(a.anchor, b.anchor) <= _AT_MOST
         )
     )
 

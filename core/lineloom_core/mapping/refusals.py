@@ -35,7 +35,7 @@ def refuse_barred(site: SiteMap, candidates: list[Constraint]) -> list[Constrain
 def _says_the_same_as(site: SiteMap, c: Constraint) -> Constraint | None:
     for barred in site.verdicts.all_barred():
         if barred.place_a < 0 or any(
-            k not in site.keyframes for k in (barred.keyframe_a, barred.keyframe_b)
+            not site.knows(k) for k in (barred.keyframe_a, barred.keyframe_b)
         ):
             continue
         for other in (barred, turned_round(barred)):

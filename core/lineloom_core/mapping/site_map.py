@@ -5,6 +5,9 @@ A function of the history gone through so far and of the verdicts upon it: `rebu
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,9 +19,10 @@ from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.constraint import Constraint, step_id
 from lineloom_core.mapping.drift import way_drift
 from lineloom_core.mapping.graph_drift import GraphDrift
-from lineloom_core.mapping.keyframe import Keyframe
+from lineloom_core.mapping.keyframe import Keyframe, Step
 from lineloom_core.mapping.memory import Memory
 from lineloom_core.mapping.place_making import make_place
+from lineloom_core.mapping.resting import Resting
 from lineloom_core.mapping.track import Track
 from lineloom_core.mapping.verdicts import Verdicts
 from lineloom_core.places import Place
@@ -50,7 +54,9 @@ class SiteMap:
         pairs of places compared (`contradictions`)."""
         self.now = 0
         """Version of the latest keyframe: when what is decided now is decided."""
+        self.resting = Resting()
         self._track_of: dict[int, Track] = {}
+        self._latest_track: dict[str, Track] = {}
         self._graph_drift = GraphDrift(self.graph, self.keyframes)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -77,6 +83,7 @@ class SiteMap:
         if step is None or self.verdicts.barred(step_id(keyframe.id)):
             name = str(keyframe.track) if step is None else f"{keyframe.track}.{keyframe.id}"
             track = self.tracks[name] = Track(name, keyframe.robot)
+            self._latest_track[keyframe.robot] = track
             track.append(keyframe.id, Pose.identity(), np.zeros((3, 3)))
             self._track_of[keyframe.id] = track
             self.graph.add_node(keyframe.id, Pose.identity())
@@ -86,17 +93,7 @@ class SiteMap:
         track.append(keyframe.id, T, step.drift)
         self._track_of[keyframe.id] = track
         self.graph.add_node(keyframe.id, self.pose(step.previous) @ T)
-        constraint = Constraint(
-            id=step_id(keyframe.id),
-            kind="sequential",
-            state="accepted",
-            keyframe_a=step.previous,
-            keyframe_b=keyframe.id,
-            T_a_b=T,
-            information=step.information,
-            reason="tracked from scan to scan",
-            checks=step.checks,
-        )
+        constraint = _tracked(keyframe.id, step)
         self.add_constraint(constraint)
         return constraint
 
@@ -113,17 +110,27 @@ class SiteMap:
         """The track that a keyframe is on."""
         return self._track_of[keyframe]
 
+    def is_latest(self, track: Track) -> bool:
+        """Whether no later track of its robot is known: it may go on."""
+        return self._latest_track[track.robot] is track
+
     def same_track(self, a: int, b: int) -> bool:
         """Whether tracking alone links two keyframes."""
         return self._track_of[a] is self._track_of[b]
 
     def pose(self, keyframe: int) -> Pose:
         """T_map_laser of a keyframe in its component's frame, as the graph has it now."""
-        return self.graph.pose(keyframe)
+        holder, T_holder_keyframe = self.resting.on(keyframe)
+        pose = self.graph.pose(holder)
+        return pose if holder == keyframe else pose @ T_holder_keyframe
+
+    def knows(self, keyframe: int) -> bool:
+        """Whether a keyframe has been seen, kept or not."""
+        return keyframe in self._track_of
 
     def component_root(self, keyframe: int) -> int:
         """The oldest keyframe of the component: its anchor and name giver."""
-        return self.graph.component_root(keyframe)
+        return self.graph.component_root(self.resting.on(keyframe)[0])
 
     def component_id(self, keyframe: int) -> str:
         """Stable id of the keyframe's component: that of its oldest track."""
@@ -131,7 +138,7 @@ class SiteMap:
 
     def same_component(self, a: int, b: int) -> bool:
         """Whether the relative pose of two keyframes is known."""
-        return self.graph.connected(a, b)
+        return self.graph.connected(self.resting.on(a)[0], self.resting.on(b)[0])
 
     def way_between(self, a: int, b: int) -> float:
         """Metres over which error may have grown between two keyframes of one component.
@@ -201,10 +208,58 @@ class SiteMap:
         """Keyframes of the same component within `radius` m, nearest first, with distances."""
         return self.graph.within(keyframe, radius)
 
-    def neighbours_on_track(self, keyframe: int, reach: int) -> list[int]:
-        """The keyframe and up to `reach` before and after it on its track, itself first."""
-        track = self._track_of[keyframe]
-        chain = track.keyframes
-        where = track.position(keyframe)
-        around = chain[max(where - reach, 0) : where + reach + 1]
-        return sorted(around, key=lambda k: (abs(track.position(k) - where), k))
+    def let_go(self, runs: Sequence[Sequence[int]]) -> None:
+        """Take runs of successive keyframes of a track each out of the map.
+
+        The steps over a run become one step; loops that end in it are given up. Its keyframes stay
+        where they are, fixed to the one before them.
+        """
+        over = [found for run in runs if (found := self._lay_to_rest(run)) is not None]
+        gone = [k for run in runs for k in run]
+        for edge in self.graph.remove_nodes(gone):
+            self.constraints.pop(edge.id, None)
+        for k in gone:
+            del self.keyframes[k]
+        for keyframe, step in over:
+            self.keyframes[keyframe] = replace(self.keyframes[keyframe], step=step)
+            self.add_constraint(_tracked(keyframe, step))
+
+    def _lay_to_rest(self, run: Sequence[int]) -> tuple[int, Step] | None:
+        """Fix a run to what stays; return what comes after it and the one step over the run."""
+        before, after = self._track_of[run[0]].let_go(run)
+        holder = after if before is None else before
+        assert holder is not None, "a track keeps at least one keyframe"
+        here = self.pose(holder)
+        for k in run:
+            self.resting.lay(k, holder, here.between(self.pose(k)))
+        if before is None or after is None:
+            return None
+        steps = (self.keyframes[k].step for k in (*run, after))
+        return after, functools.reduce(Step.then, (step for step in steps if step is not None))
+
+    def tidy(self) -> None:
+        """Forget what rested on keyframes and places that are gone."""
+        self.constraints = {
+            name: c
+            for name, c in self.constraints.items()
+            if c.keyframe_a in self.keyframes
+            and c.keyframe_b in self.keyframes
+            and (c.state == "accepted" or c.place_a < 0 or self._has_places(c))
+        }
+
+    def _has_places(self, c: Constraint) -> bool:
+        return c.place_a in self.places and c.place_b in self.places
+
+
+def _tracked(keyframe: int, step: Step) -> Constraint:
+    return Constraint(
+        id=step_id(keyframe),
+        kind="sequential",
+        state="accepted",
+        keyframe_a=step.previous,
+        keyframe_b=keyframe,
+        T_a_b=step.T_previous_this,
+        information=step.information,
+        reason="tracked from scan to scan",
+        checks=step.checks,
+    )

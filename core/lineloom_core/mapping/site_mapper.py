@@ -153,7 +153,7 @@ class SiteMapper:
     def explain(self, constraint: str) -> Evidence | None:
         """What speaks for a constraint and against it; None for an unknown one."""
         known = self._find(constraint)
-        return None if known is None else explain(self._site, known)
+        return None if known is None else explain(self._site, self._history, known)
 
     def localise(self, scans: Sequence[Scan]) -> Localisation:
         """Where one robot's scans were taken, the latest counts; changes nothing."""

@@ -57,8 +57,9 @@ def _robot(site: SiteMap, record: RobotRecord, component_of: dict[int, str]) -> 
     if latest is not None:
         T_base_laser = record.mount.T_base_laser
         pose = site.pose(latest.keyframe) @ latest.T_keyframe_laser @ T_base_laser.inverse()
-        component = component_of[latest.keyframe]
-        covariance = _covariance(site, latest.keyframe)
+        holder, _ = site.resting.on(latest.keyframe)
+        component = component_of[holder]
+        covariance = _covariance(site, holder)
     return RobotView(
         robot=record.name,
         component=component,
@@ -90,7 +91,7 @@ def _trajectory(site: SiteMap, record: RobotRecord, component_of: dict[int, str]
         session=tuple(p.session for p in placed),
         seq=np.array([p.seq for p in placed], dtype=np.int64),
         stamp=np.array([p.stamp for p in placed], dtype=np.float64),
-        component=tuple(component_of[p.keyframe] for p in placed),
+        component=tuple(component_of[site.resting.on(p.keyframe)[0]] for p in placed),
         poses=poses,
     )
 

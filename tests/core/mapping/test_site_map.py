@@ -81,9 +81,10 @@ def test_neighbours_on_the_track_come_nearest_first(
     site: SiteMap, loop: list[SimulatedScan]
 ) -> None:
     ids = lay_track(site, loop)
-    assert site.neighbours_on_track(ids[10], 2) == [ids[10], ids[9], ids[11], ids[8], ids[12]]
-    assert site.neighbours_on_track(ids[0], 2) == ids[:3]
-    assert site.neighbours_on_track(ids[-1], 1) == [ids[-1], ids[-2]]
+    track = site.track(ids[0])
+    assert track.neighbours(ids[10], 2) == [ids[10], ids[9], ids[11], ids[8], ids[12]]
+    assert track.neighbours(ids[0], 2) == ids[:3]
+    assert track.neighbours(ids[-1], 1) == [ids[-1], ids[-2]]
 
 
 def test_only_accepted_constraints_hold_the_graph_together(
