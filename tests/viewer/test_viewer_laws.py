@@ -208,7 +208,8 @@ def test_changes_make_the_same_map_as_the_whole(run: Run) -> None:
         "net/map_copy.js",
         """
         const ends = { x1: 0, y1: 0, x2: 1, y2: 0 };
-        const line = (i, support) => ({ id: `l${i}`, component: "c0", robots: [], support, ...ends });
+        const line = (i, support) =>
+            ({ id: `l${i}`, component: "c0", robots: [], support, ...ends });
         const first = Array.from({ length: 3000 }, (_, i) => line(i, 1));
         const second = [...first.slice(10), line(5000, 1)];
         second[0] = line(10, 7);
@@ -260,8 +261,10 @@ def test_a_line_set_that_was_brought_up_to_date_is_one_made_anew(run: Run) -> No
         for (let round = 0; round < 40; round++) {
             if (round === 20) robots = ["ada", "ann", "bob", "cyd"];
             const names = [...lines.keys()].filter(() => random(0, 1) < 0.1);
-            const [removed, moved] = [names.filter((_, i) => i % 3 === 0), names.filter((_, i) => i % 3)];
-            const fresh = Array.from({ length: whole(0, 20) }, (_, i) => `l${1000 * (round + 1) + i}`);
+            const removed = names.filter((_, i) => i % 3 === 0);
+            const moved = names.filter((_, i) => i % 3 !== 0);
+            const numbers = Array.from({ length: whole(0, 20) }, (_, i) => 1000 * (round + 1) + i);
+            const fresh = numbers.map((i) => `l${i}`);
             const changed = [...moved, ...fresh].map(made);
             const out = new Map(names.map((name) => [name, lines.get(name)]));
             const before = set;
@@ -269,12 +272,16 @@ def test_a_line_set_that_was_brought_up_to_date_is_one_made_anew(run: Run) -> No
             for (const name of removed) lines.delete(name);
             for (const line of changed) lines.set(line.id, line);
             const anew = m.LineSet.of([...lines.values()], robots);
-            const arrived = set.predecessor === before.serial ? set.arrived.map((l) => l.id) : fresh;
-            if (looks(set).join("|") !== looks(anew).join("|")) differences.push(`${round} looks`);
-            if (bounds(set) !== bounds(anew)) differences.push(`${round} bounds`);
-            if (arrived.sort().join() !== fresh.sort().join()) differences.push(`${round} arrived`);
-            if (set.indexOf(changed[0]?.id) !== set.answers.indexOf(changed[0])) differences.push("index");
-            if (removed.some((name) => set.indexOf(name) !== -1)) differences.push(`${round} removed`);
+            const follows = set.predecessor === before.serial;
+            const arrived = follows ? set.arrived.map((l) => l.id) : fresh;
+            const wrong = {
+                looks: looks(set).join("|") !== looks(anew).join("|"),
+                bounds: bounds(set) !== bounds(anew),
+                arrived: arrived.sort().join() !== fresh.sort().join(),
+                index: set.indexOf(changed[0]?.id) !== set.answers.indexOf(changed[0]),
+                removed: removed.some((name) => set.indexOf(name) !== -1),
+            };
+            for (const [what, is] of Object.entries(wrong)) if (is) differences.push([round, what]);
         }
         return differences;
         """,

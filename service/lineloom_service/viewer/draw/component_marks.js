@@ -6,7 +6,7 @@ import { drawLabel } from "./label.js";
  * other.
  *
  * @param {CanvasRenderingContext2D} context @param {import("./camera.js").Camera} camera
- * @param {import("./painter.js").Scene} scene @param {string} selected
+ * @param {import("./scene.js").Scene} scene @param {string} selected
  */
 export function drawComponents(context, camera, { state, placement, palette }, selected) {
   if (state.components.length < 2) return;

@@ -6,7 +6,7 @@ const MOST_FRESH = 600;
 
 /**
  * @typedef {{kind: "line"|"constraint"|"robot"|"component", id: string}} Thing
- * @typedef {import("./painter.js").Scene} Scene
+ * @typedef {import("./scene.js").Scene} Scene
  * @typedef {import("./camera.js").Camera} Camera
  * @typedef {import("../data/line_set.js").LineSet} LineSet
  * @typedef {import("../net/contract.js").LineAnswer} LineAnswer

@@ -20,7 +20,7 @@ const AROUND = { top: 60, right: 60, bottom: 60, left: 60 };
 /**
  * @typedef {import("../data/site_state.js").SiteState} SiteState
  * @typedef {import("./highlight_marks.js").Thing} Thing
- * @typedef {{draw: (context: CanvasRenderingContext2D, camera: Camera, scene: import("./painter.js").Scene) => void}} Mark
+ * @typedef {{draw: (context: CanvasRenderingContext2D, camera: Camera, scene: import("./scene.js").Scene) => void}} Mark
  */
 
 /** The canvas: draws a frame whenever something has changed, and none otherwise. */
@@ -62,7 +62,7 @@ export class MapView {
     this._resize();
   }
 
-  /** What is drawn, and where. @returns {import("./painter.js").Scene|null} */
+  /** What is drawn, and where. @returns {import("./scene.js").Scene|null} */
   get scene() {
     if (!this.state) return null;
     const { state, placement, palette, layers } = this;
@@ -155,7 +155,7 @@ export class MapView {
     if (more) this.draw();
   }
 
-  /** @param {CanvasRenderingContext2D} context @param {import("./painter.js").Scene} scene */
+  /** @param {CanvasRenderingContext2D} context @param {import("./scene.js").Scene} scene */
   _drawMap(context, scene) {
     const { camera, palette } = this;
     const more = this._picture.draw(context, camera, this._ratio);

@@ -19,7 +19,7 @@ export class Picture {
     /** @type {Generator|null} */
     this._job = null;
     this._stale = true;
-    /** @type {import("./painter.js").Scene|null} */
+    /** @type {import("./scene.js").Scene|null} */
     this._scene = null;
     this._hurried = false;
   }
@@ -29,7 +29,7 @@ export class Picture {
     this._hurried = (this._scene?.state.lines.length ?? 0) < HURRIED_LINES;
   }
 
-  /** Show this scene from now on. @param {import("./painter.js").Scene} scene */
+  /** Show this scene from now on. @param {import("./scene.js").Scene} scene */
   show(scene) {
     this._scene = scene;
     this._stale = true;

@@ -48,7 +48,7 @@ export class RobotMarks {
 
   /**
    * @param {CanvasRenderingContext2D} context @param {import("./camera.js").Camera} camera
-   * @param {import("./painter.js").Scene} scene @param {string} selected
+   * @param {import("./scene.js").Scene} scene @param {string} selected
    */
   draw(context, camera, { state, placement, palette, layers }, selected) {
     for (const robot of this._robots) {

@@ -35,7 +35,7 @@ export class Localizer {
     this._points = scanPoints(scans[this.answer?.scan ?? scans.length - 1]);
   }
 
-  /** @param {CanvasRenderingContext2D} context @param {import("../draw/camera.js").Camera} camera @param {import("../draw/painter.js").Scene} scene */
+  /** @param {CanvasRenderingContext2D} context @param {import("../draw/camera.js").Camera} camera @param {import("../draw/scene.js").Scene} scene */
   draw(context, camera, { placement, palette }) {
     this.answer?.hypotheses.forEach((hypothesis, rank) => {
       const component = placement.get(hypothesis.component);

@@ -3,7 +3,7 @@ import { stroke } from "../draw/highlight_marks.js";
 
 /**
  * @typedef {{x: number, y: number, component: string|null}} Stake a point of the page [m]
- * @typedef {import("../draw/painter.js").Scene} Scene
+ * @typedef {import("../draw/scene.js").Scene} Scene
  */
 
 /** Measures from point to point. Between two components there is no distance to be known. */

@@ -3,7 +3,7 @@ import { constraintEnds } from "../draw/constraint_marks.js";
 
 /**
  * @typedef {import("../draw/highlight_marks.js").Thing} Thing
- * @typedef {import("../draw/painter.js").Scene} Scene
+ * @typedef {import("../draw/scene.js").Scene} Scene
  */
 
 /**

@@ -3,7 +3,7 @@ import { apply } from "../geometry/pose.js";
 /**
  * Return the end of a wall within reach of a point, or the point itself.
  *
- * @param {import("../draw/painter.js").Scene} scene @param {{x: number, y: number}} point page [m]
+ * @param {import("../draw/scene.js").Scene} scene @param {{x: number, y: number}} point page [m]
  * @param {number} reach [m]
  */
 export function snapped({ state, placement }, point, reach) {
