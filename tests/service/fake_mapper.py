@@ -44,6 +44,9 @@ from lineloom_core.scan import Mount, Scan
 RAISES, CRASHES, RAISES_ONCE, HANGS = 666.0, 667.0, 668.0, 669.0
 """Stamps of scans that make the mapper fail."""
 
+UNSEEN, UNSAVED = 670.0, 671.0
+"""Stamps of scans after which it can make no view, or no snapshot, until the next scan."""
+
 SECONDS_PER_SCAN = float(os.environ.get("FAKE_MAPPER_SECONDS", "0"))
 GENTLE = bool(os.environ.get("FAKE_MAPPER_GENTLE"))
 """Then it fails on scans only."""
@@ -59,6 +62,7 @@ class FakeMapper:
     def __init__(self) -> None:
         self._chain = b""
         self._version = 0
+        self._latest = 0.0
         self._scans: dict[str, list[tuple[str, int, float]]] = {}
         self._mounts: dict[str, Mount] = {}
         self._retracted: dict[str, int] = {}
@@ -67,6 +71,7 @@ class FakeMapper:
         if SECONDS_PER_SCAN:
             time.sleep(SECONDS_PER_SCAN)
         self._version += 1
+        self._latest = scan.stamp
         self._link(robot, repr((scan.session, scan.seq, scan.stamp)), scan.ranges.tobytes())
         if scan.stamp == HANGS:
             time.sleep(3600.0)
@@ -141,6 +146,8 @@ class FakeMapper:
         return Localisation("unique", "it fits", seen[-1], (best,))
 
     def view(self) -> SiteView:
+        if self._latest == UNSEEN:
+            raise ValueError("there is nothing to see")
         keyframes = tuple(self._keyframes())
         robots = tuple(sorted(self._scans))
         components = sorted({_component(robot) for robot in robots})
@@ -159,6 +166,8 @@ class FakeMapper:
         )
 
     def snapshot(self) -> bytes:
+        if self._latest == UNSAVED:
+            raise ValueError("this cannot be pickled")
         return pickle.dumps(self.__dict__)
 
     @classmethod

@@ -59,6 +59,7 @@ class Conductor:
         self._store.subscribe(self._on_commit)
         self._store.subscribe_news(self._on_news)
         self._engine.subscribe(self._on_view)
+        self._engine.subscribe_failures(self._on_view_failed)
         if self._store.shared:
             for record in await self._store.sites():
                 self._views.fetch(record.id)
@@ -82,6 +83,8 @@ class Conductor:
             _, late = await asyncio.wait(savings, timeout=self._stop_grace_s)
             for saving in late:
                 saving.cancel()
+            if late:
+                _LOG.warning("%d sites are not saved; what is not is mapped again", len(late))
             await asyncio.gather(*savings, return_exceptions=True)
         await self._views.stop()
         if self._recorder is not None:
@@ -255,6 +258,11 @@ class Conductor:
         runner.on_view(position, view)
         if self._store.shared and runner.published is not None:
             self._views.save(site_id, runner.published)
+
+    def _on_view_failed(self, site_id: int, position: int, reason: str) -> None:
+        runner = self._runners.get(site_id)
+        if runner is not None:
+            runner.on_view_failed(position, reason)
 
 
 def _report_end(task: asyncio.Task[None]) -> None:

@@ -26,11 +26,14 @@ from lineloom_service.engine.messages import (
     TakeSnapshot,
     Timed,
     View,
+    ViewFailed,
 )
 from lineloom_service.engine.protocol import (
+    FailureListener,
     MapperFailedError,
     QuestionFailedError,
     RestoreFailedError,
+    SnapshotFailedError,
     ViewListener,
     WorkerDiedError,
 )
@@ -92,6 +95,7 @@ class LocalEngine:
         self._slots = [_Slot(number) for number in range(workers)]
         self._sites: dict[int, _Site] = {}
         self._listeners: list[ViewListener] = []
+        self._failure_listeners: list[FailureListener] = []
         self._durations = Durations()
         self._stopping = False
 
@@ -125,6 +129,10 @@ class LocalEngine:
     def subscribe(self, listener: ViewListener) -> None:
         """Have `listener` told of published views."""
         self._listeners.append(listener)
+
+    def subscribe_failures(self, listener: FailureListener) -> None:
+        """Have `listener` told of views that could not be made."""
+        self._failure_listeners.append(listener)
 
     def not_ready(self) -> list[str]:
         """Return which workers are not warm yet."""
@@ -239,6 +247,9 @@ class LocalEngine:
         if isinstance(report, View):
             for listener in self._listeners:
                 listener(report.site, report.position, report.view)
+        elif isinstance(report, ViewFailed):
+            for told in self._failure_listeners:
+                told(report.site, report.position, report.reason)
         elif isinstance(report, Failed):
             hosted.fail(MapperFailedError(report.position, report.reason))
         elif isinstance(report, Started) and report.failure is not None:
@@ -272,5 +283,7 @@ def _resolve(answer: asyncio.Future[Any], report: Fed | Started | Snapshot | Ans
         answer.set_exception(QuestionFailedError(report.failure))
     elif isinstance(report, Answered):
         answer.set_result(report.value)
+    elif isinstance(report, Snapshot) and report.failure is not None:
+        answer.set_exception(SnapshotFailedError(report.failure))
     else:
         answer.set_result(report.data if isinstance(report, Snapshot) else b"")

@@ -108,6 +108,16 @@ class EncodedView:
 
 
 @dataclass(frozen=True, slots=True)
+class ViewFailed:
+    """The mapper could not show the site as it is after the entry at `position`."""
+
+    site: int
+    run: int
+    position: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
 class Stopped:
     """The site is hosted no longer: nothing more comes of it."""
 
@@ -116,11 +126,12 @@ class Stopped:
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """The state after all that was fed."""
+    """The state after all that was fed. failure: why there is none."""
 
     site: int
     run: int
-    data: bytes
+    data: bytes = b""
+    failure: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +161,6 @@ class Timed:
     durations: Durations
 
 
-Report = Timed | Ready | Started | Fed | View | Snapshot | Answered | Failed
+Report = Timed | Ready | Started | Fed | View | ViewFailed | Snapshot | Answered | Failed
 Sent = Report | EncodedView | Stopped
 """What a worker sends; `WorkerProcess` makes reports of it."""

@@ -14,6 +14,10 @@ ViewListener = Callable[[int, int, SiteView], None]
 """Called on the event loop with site id, position and the view after the entry at position."""
 
 
+FailureListener = Callable[[int, int, str], None]
+"""Called on the event loop with site id, position and why there is no view after the entry."""
+
+
 class MapperFailedError(Exception):
     """The mapper raised on the entry at `position`. The site has to be started again."""
 
@@ -25,6 +29,10 @@ class MapperFailedError(Exception):
 
 class RestoreFailedError(Exception):
     """A snapshot cannot be restored. The site has to be started from another, or from nothing."""
+
+
+class SnapshotFailedError(Exception):
+    """The mapper could not be saved. The map is as it was, and the site goes on."""
 
 
 class QuestionFailedError(Exception):
@@ -63,6 +71,10 @@ class Engine(Protocol):
         """Have `listener` told of published views."""
         ...
 
+    def subscribe_failures(self, listener: FailureListener) -> None:
+        """Have `listener` told of views that the mapper could not make."""
+        ...
+
     def not_ready(self) -> list[str]:
         """Return what is missing before mappers can run; empty when nothing is."""
         ...
@@ -96,7 +108,7 @@ class Engine(Protocol):
         ...
 
     async def snapshot(self, site: int) -> bytes:
-        """Return the mapper's state after all that was fed. Raises MapperFailedError."""
+        """Return the mapper's state after all that was fed. Raises SnapshotFailedError."""
         ...
 
     def ask(self, site: int, question: str, *arguments: object) -> Awaitable[Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from collections import Counter, deque
 from dataclasses import dataclass
 
@@ -14,6 +15,7 @@ from lineloom_service.engine.protocol import (
     MapperFailedError,
     Recorder,
     RestoreFailedError,
+    SnapshotFailedError,
     WorkerDiedError,
 )
 from lineloom_service.engine.published import Published
@@ -28,6 +30,9 @@ _FEEDS_UNDER_WAY = 2
 _AGAIN_S = 1.0
 _GATHER_S = 0.02
 """A site that was idle waits so long for more: one by one, scans cost several times as much."""
+
+_SAVE_AGAIN_S = 5.0
+"""After a failure: it will likely fail again, and mapping goes on without."""
 
 _STRIKES = {"raised": 2, "crashed": 3, "killed": 10}
 """An entry is skipped after so many failures without a success in between.
@@ -68,8 +73,6 @@ class SiteRunner:
         self.published: Published | None = None
         self.expected = 0
         """Only a view at this position, or later, answers as was answered before the start."""
-        self.trouble: str | None = None
-        """Why the site is not mapped just now."""
         self._end = record.position
         self._store = store
         self._engine = engine
@@ -79,10 +82,17 @@ class SiteRunner:
         self._recorded = 0
         self._wake = asyncio.Event()
         self._strikes: Counter[int] = Counter()
+        self._troubles: dict[str, str] = {}
+        self._save_at = 0.0
         self._sent = self._done = self._saved = 0
         self._scans_sent = self._scans_done = 0
         self._marks: dict[int, int] = {}
         self._under_way: deque[tuple[asyncio.Future[object], int, int]] = deque()
+
+    @property
+    def trouble(self) -> str | None:
+        """Why the site is not mapped, shown or saved just now; None where all is well."""
+        return "; ".join(self._troubles.values()) or None
 
     @property
     def done(self) -> int:
@@ -103,8 +113,13 @@ class SiteRunner:
         skipped = sum(skip.kind == "scan" for skip in left_out)
         self.published = Published(position, scans, skipped, view, left_out)
         self._marks = {at: n for at, n in self._marks.items() if at >= position}
+        self._troubles.pop("view", None)
         if self._recorder is not None:
             self._recorder.on_view(self.site, position, view)
+
+    def on_view_failed(self, position: int, reason: str) -> None:
+        """The last view stands."""
+        self._troubles["view"] = f"its map after entry {position} cannot be shown: {reason}"
 
     async def run(self) -> None:
         """Keep the site hosted and fed, whatever happens to its worker."""
@@ -121,13 +136,16 @@ class SiteRunner:
             except RestoreFailedError as failure:
                 await self._drop_snapshot(str(failure))
             except StoreError as error:
-                if self.trouble is None:
+                if "log" not in self._troubles:
                     _LOG.exception("site %s: its log cannot be read, trying again", self.name)
-                self.trouble = f"its log cannot be read: {error}"
+                self._troubles["log"] = f"its log cannot be read: {error}"
                 await asyncio.sleep(_AGAIN_S)
 
     async def save(self) -> None:
-        """Save a snapshot if anything was mapped since the last one. Nothing may be under way."""
+        """Save a snapshot if anything was mapped since the last one. Nothing may be under way.
+
+        Where it cannot be saved, the site says so and goes on: a restart maps again what is not.
+        """
         if self._done == self._saved:
             return
         if self._recorder is not None:
@@ -136,10 +154,18 @@ class SiteRunner:
                 self.site, [], self._done, caught_up=self._done >= self._end, publish=True
             )
             await self._recorder.settled(self.site)
-        data = await self._engine.snapshot(self.site)
-        record = SnapshotRecord(self._done, self._scans_done, self._producer, data)
-        await self._store.save_snapshot(self.site, record)
-        self._saved = self._done
+        try:
+            data = await self._engine.snapshot(self.site)
+            record = SnapshotRecord(self._done, self._scans_done, self._producer, data)
+            await self._store.save_snapshot(self.site, record)
+        except (SnapshotFailedError, StoreError) as error:
+            if "saving" not in self._troubles:
+                _LOG.exception("site %s: its map cannot be saved, trying again", self.name)
+            self._troubles["saving"] = f"its map is not saved beyond entry {self._saved}: {error}"
+            self._save_at = time.monotonic() + _SAVE_AGAIN_S
+        else:
+            self._troubles.pop("saving", None)
+            self._saved = self._done
 
     async def finish(self) -> None:
         """After `run` was cancelled: wait for what is under way and save."""
@@ -160,6 +186,7 @@ class SiteRunner:
         await self._engine.start_site(
             self.site, self._saved, None if snapshot is None else snapshot.data
         )
+        self._troubles.pop("start", None)
         while True:
             self._wake.clear()
             while self._sent < self._end and len(self._under_way) < _FEEDS_UNDER_WAY:
@@ -168,7 +195,8 @@ class SiteRunner:
                 await self._await_one()
             elif self._sent >= self._end:
                 await self._idle()
-            if self._done - self._saved >= self._pace.snapshot_every:
+            unsaved = self._done - self._saved
+            if unsaved >= self._pace.snapshot_every and time.monotonic() >= self._save_at:
                 await self._drain()
                 await self.save()
 
@@ -181,7 +209,7 @@ class SiteRunner:
             self._end = self._sent
             return
         wanted: list[LogEntry] = [e for e in entries if e.position not in self.skips]
-        self.trouble = None
+        self._troubles.pop("log", None)
         self._sent = entries[-1].position
         self._scans_sent += sum(entry.kind == "scan" for entry in wanted)
         self._marks[self._sent] = self._scans_sent
@@ -207,9 +235,10 @@ class SiteRunner:
             await self._await_one()
 
     async def _idle(self) -> None:
-        if self._done == self._saved:
-            self.trouble = None  # nothing is left to read or to save
-        pause = None if self._done == self._saved else self._pace.snapshot_idle_s
+        self._troubles.pop("log", None)  # nothing is left to read
+        pause = None
+        if self._done != self._saved:
+            pause = max(self._pace.snapshot_idle_s, self._save_at - time.monotonic())
         try:
             # Not `wait_for`: that may lose a cancellation that comes together with the event.
             async with asyncio.timeout(pause):
@@ -245,7 +274,7 @@ class SiteRunner:
         """Go back to the snapshot before, or to the log."""
         if self._saved == 0:
             _LOG.error("site %s: the mapper does not start: %s", self.name, reason)
-            self.trouble = f"its mapper does not start: {reason}"
+            self._troubles["start"] = f"its mapper does not start: {reason}"
             await asyncio.sleep(5.0)
             return
         _LOG.error("site %s: snapshot %d is unreadable: %s", self.name, self._saved, reason)

@@ -33,6 +33,7 @@ from lineloom_service.engine.messages import (
     StopSite,
     TakeSnapshot,
     Timed,
+    ViewFailed,
 )
 from lineloom_service.engine.turns import Turns
 from lineloom_service.engine.view_parts import ViewEncoder
@@ -193,9 +194,9 @@ class Worker:
             data = zlib.compress(hosted.mapper.snapshot(), 1)
             self._durations.observe("snapshot", time.perf_counter() - begin)
         except Exception as error:
+            # The map is as it was, and no entry is to blame: the site goes on without.
             _LOG.exception("site %d: no snapshot", order.site)
-            del self._sites[order.site]
-            self._connection.send(Failed(order.site, order.run, hosted.position, describe(error)))
+            self._connection.send(Snapshot(order.site, order.run, failure=describe(error)))
             return
         finally:
             self._current.clear()
@@ -237,9 +238,11 @@ class Worker:
         self._current.mark(site, BUSY)
         try:
             parts = hosted.encoder.encode(hosted.mapper.view())
-        except Exception:
+        except Exception as error:
             # The site stays at its last view, and is not idle: that is the truth.
             _LOG.exception("site %d: no view after entry %d", site, hosted.position)
+            failed = ViewFailed(site, hosted.run, hosted.position, describe(error))
+            self._connection.send(failed)
         else:
             self._durations.observe("view", time.monotonic() - started)
             self._connection.send(Timed(self._durations.take()))
