@@ -13,7 +13,8 @@ from lineloom_core.graph.covariance import (
     in_map_axes,
     marginal_covariance,
 )
-from lineloom_core.graph.edge import Edge, EdgeKind, chi_squared, tangent_errors
+from lineloom_core.graph.edge import Edge, EdgeKind, chi_squared
+from lineloom_core.graph.growing import GrowingArray
 from lineloom_core.graph.initialise import initialise_from_tree, rigid_join
 from lineloom_core.graph.inliers import InlierTest, select_inliers
 from lineloom_core.graph.observability import Observability, observe, project_out_weak
@@ -26,6 +27,7 @@ __all__ = [
     "Covariances",
     "Edge",
     "EdgeKind",
+    "GrowingArray",
     "InlierTest",
     "Observability",
     "Piece",
@@ -46,6 +48,5 @@ __all__ = [
     "rigid_join",
     "select_inliers",
     "settle",
-    "tangent_errors",
     "together",
 ]

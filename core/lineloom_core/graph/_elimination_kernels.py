@@ -273,31 +273,19 @@ def diagonal_of_inverse(diagonal, below, starts, rows):  # type: ignore[no-untyp
     for j in range(diagonal.shape[0] - 1, -1, -1):
         first, last = starts[j], starts[j + 1]
         for p in range(first, last):  # Z[u, j] = -(sum over w of Z[u, w] L[w, j]) L[j, j]^-1
-            for q in range(first, last):
-                low, high = min(p, q), max(p, q)
-                if low == high:
-                    add_product(Z[p], out[rows[p]], below[q], p < q)
-                    continue
-                t = starts[rows[low]]
-                while rows[t] != rows[high]:
+            u = rows[p]
+            subtract_plain_product(Z[p], out[u], below[p])
+            t = starts[u]
+            for q in range(p + 1, last):
+                while rows[t] != rows[q]:
                     t += 1
-                add_product(Z[p], Z[t], below[q], p < q)
-            Z[p] *= -1.0
-            divide_right(Z[p], diagonal[j])
-        S[:] = 0.0
-        for q in range(first, last):
-            add_product(S, Z[q], below[q], True)
+                subtract_turned_product(Z[p], Z[t], below[q])
+                subtract_plain_product(Z[q], Z[t], below[p])
         d = diagonal[j]
-        S *= -1.0
-        # plus L[j, j]^-T, upper triangular
-        u00, u11, u22 = 1.0 / d[0, 0], 1.0 / d[1, 1], 1.0 / d[2, 2]
-        u01, u12 = -d[1, 0] * u00 * u11, -d[2, 1] * u11 * u22
-        S[0, 0] += u00
-        S[1, 1] += u11
-        S[2, 2] += u22
-        S[0, 1] += u01
-        S[1, 2] += u12
-        S[0, 2] += -(d[2, 0] * u00 + d[2, 1] * u01) * u22
+        invert_turned(d, S)
+        for p in range(first, last):
+            divide_right(Z[p], d)
+            subtract_turned_product(S, Z[p], below[p])
         divide_right(S, d)
         for r in range(3):
             for c in range(3):
@@ -306,9 +294,36 @@ def diagonal_of_inverse(diagonal, below, starts, rows):  # type: ignore[no-untyp
 
 
 @njit(cache=True)
-def add_product(C, A, B, turned):  # type: ignore[no-untyped-def]
-    """C += A B, or A' B where A is stored `turned`."""
+def invert_turned(d, out):  # type: ignore[no-untyped-def]
+    """out = d^-T, upper triangular, of the lower triangular d."""
+    out[:] = 0.0
+    out[0, 0], out[1, 1], out[2, 2] = 1.0 / d[0, 0], 1.0 / d[1, 1], 1.0 / d[2, 2]
+    out[0, 1] = -d[1, 0] * out[0, 0] * out[1, 1]
+    out[1, 2] = -d[2, 1] * out[1, 1] * out[2, 2]
+    out[0, 2] = -(d[2, 0] * out[0, 0] + d[2, 1] * out[0, 1]) * out[2, 2]
+
+
+@njit(cache=True)
+def subtract_plain_product(C, A, B):  # type: ignore[no-untyped-def]
+    """C -= A B of 3x3 blocks."""
+    b00, b01, b02 = B[0, 0], B[0, 1], B[0, 2]
+    b10, b11, b12 = B[1, 0], B[1, 1], B[1, 2]
+    b20, b21, b22 = B[2, 0], B[2, 1], B[2, 2]
     for r in range(3):
-        for c in range(3):
-            for k in range(3):
-                C[r, c] += (A[k, r] if turned else A[r, k]) * B[k, c]
+        a0, a1, a2 = A[r, 0], A[r, 1], A[r, 2]
+        C[r, 0] -= a0 * b00 + a1 * b10 + a2 * b20
+        C[r, 1] -= a0 * b01 + a1 * b11 + a2 * b21
+        C[r, 2] -= a0 * b02 + a1 * b12 + a2 * b22
+
+
+@njit(cache=True)
+def subtract_turned_product(C, A, B):  # type: ignore[no-untyped-def]
+    """C -= A' B of 3x3 blocks."""
+    b00, b01, b02 = B[0, 0], B[0, 1], B[0, 2]
+    b10, b11, b12 = B[1, 0], B[1, 1], B[1, 2]
+    b20, b21, b22 = B[2, 0], B[2, 1], B[2, 2]
+    for r in range(3):
+        a0, a1, a2 = A[0, r], A[1, r], A[2, r]
+        C[r, 0] -= a0 * b00 + a1 * b10 + a2 * b20
+        C[r, 1] -= a0 * b01 + a1 * b11 + a2 * b21
+        C[r, 2] -= a0 * b02 + a1 * b12 + a2 * b22

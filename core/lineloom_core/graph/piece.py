@@ -90,10 +90,14 @@ class Piece:
         """Other poses (n, 3) of the piece's nodes, by node id."""
         return PoseTable({node: i for i, node in enumerate(self.ids.tolist())}, poses)
 
+    def errors(self) -> NDArray[np.float64]:
+        """Log(measured^-1 T_a_b) of every edge, (m, 3)."""
+        T_a_b = se2.between(self.poses[self.ends[:, 0]], self.poses[self.ends[:, 1]])
+        return se2.log(se2.between(self.measured, T_a_b))
+
     def chi2(self) -> NDArray[np.float64]:
         """Squared whitened error of every edge, (m,), robust kernels left aside."""
-        T_a_b = se2.between(self.poses[self.ends[:, 0]], self.poses[self.ends[:, 1]])
-        errors = se2.log(se2.between(self.measured, T_a_b))
+        errors = self.errors()
         squared = np.einsum("ni,nij,nj->n", errors, self.information, errors)
         chi2: NDArray[np.float64] = np.maximum(squared, 0.0)
         return chi2

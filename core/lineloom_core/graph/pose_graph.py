@@ -158,6 +158,10 @@ class PoseGraph:
         """Return the node's component as the solver takes it, edges in order of insertion."""
         return self._whole().part(np.flatnonzero(self._labels.rows == self.component_root(node)))
 
+    def errors(self) -> NDArray[np.float64]:
+        """Return Log(measured^-1 T_a_b) of all edges at the current estimate, (m, 3)."""
+        return self._whole().errors()
+
     def residuals(self) -> dict[str, float]:
         """Return the whitened norm of every edge's error at the current estimate, by id."""
         norms = np.sqrt(self._whole().chi2()).tolist()

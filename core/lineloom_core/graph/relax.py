@@ -1,6 +1,6 @@
 """Gauss-Newton from poses that are nearly right: how a graph that has grown a little settles.
 
-Exact: all poses move until none moves by more than 0.1 um any more. Stateless: the result follows
+Exact: all poses move until none moves by more than 1 um any more. Stateless: the result follows
 from the piece alone, bit for bit, however the graph came to be as it is. Once steps are down to a
 millimetre, the matrix stays as it is for as long as they go on shrinking well.
 """
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lineloom_core.graph.normal_equations import NormalEquations
 from lineloom_core.graph.piece import Piece
 
-_SETTLED = 1e-7  # m, rad
+_SETTLED = 1e-6  # m, rad
 _MOST_STEPS = 40
 _NEAR = 1e-3  # m, rad
 _SHRINKS_WELL = 0.3

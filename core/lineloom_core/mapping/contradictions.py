@@ -14,7 +14,6 @@ import itertools
 import networkx as nx
 import numpy as np
 
-from lineloom_core.graph import tangent_errors
 from lineloom_core.mapping.constraint import Constraint, step_id
 from lineloom_core.mapping.overlap import count_steady_nearby, usual_missing
 from lineloom_core.mapping.site_map import SiteMap
@@ -151,24 +150,17 @@ def _weakest_meeting(site: SiteMap, track_a: str, track_b: str) -> list[Constrai
 def _strained(site: SiteMap, place: Place) -> tuple[Constraint, ...]:
     """Step 4: accepted loops that the graph has solved far away from what they say."""
     root = site.component_root(place.anchor)
-    loops = [
-        c
-        for c in site.constraints.values()
-        if c.kind == "loop"
-        and c.state == "accepted"
-        and c.id not in site.verdicts.approved
-        and site.component_root(c.keyframe_a) == root
-    ]
-    if not loops or site.unsolved.get(root):
+    if site.unsolved.get(root):
         return ()
-    errors = tangent_errors([c.edge() for c in loops], site.graph.nodes)
-    config = site.config.doubt
+    errors, config = site.graph.errors(), site.config.doubt
     strained = (np.hypot(errors[:, 0], errors[:, 1]) > config.most_strain) | (
         np.abs(errors[:, 2]) > config.most_turn
     )
     reason = "withdrawn: the graph contradicts it"
     return tuple(
-        c.moved_to("retracted", reason, site.now)
-        for c, bad in zip(loops, strained, strict=True)
-        if bad
+        site.constraints[edge.id].moved_to("retracted", reason, site.now)
+        for edge in itertools.compress(site.graph.edges.values(), strained)
+        if edge.kind == "loop"
+        and edge.id not in site.verdicts.approved
+        and site.component_root(edge.node_a) == root
     )

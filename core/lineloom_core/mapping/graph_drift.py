@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lineloom_core.graph import Covariances, Piece, PoseGraph
-from lineloom_core.mapping.keyframe import Keyframe
+from lineloom_core.graph import Covariances, GrowingArray, Piece, PoseGraph
+from lineloom_core.mapping.keyframe import Keyframe, Step
 
 
 class GraphDrift:
@@ -24,6 +24,9 @@ class GraphDrift:
         self._keyframes = keyframes
         self._known: dict[int, Covariances] = {}
         self._known_at = graph.changes
+        self._rows: dict[int, tuple[Step, int]] = {}
+        self._steps = GrowingArray(np.float64, (3, 3))
+        """Information of steps as measured, by row."""
 
     def between(self, a: int, b: int) -> NDArray[np.float64]:
         """Covariance (3, 3) of T_a_b, two keyframes of one component, in the tangent at b."""
@@ -37,9 +40,19 @@ class GraphDrift:
     def _as_measured(self, piece: Piece) -> Piece:
         """Tracked steps with the drift measured on them; other edges as the graph takes them."""
         tracked = ~piece.robust
-        steps = (self._keyframes[k].step for k in piece.ids[piece.ends[tracked, 1]].tolist())
-        drifts = [step.drift for step in steps if step is not None]
-        measured = np.linalg.inv(np.array(drifts).reshape(-1, 3, 3))
+        rows = [self._row(k) for k in piece.ids[piece.ends[tracked, 1]].tolist()]
         information = piece.information.copy()
-        information[tracked] = 0.5 * (measured + np.swapaxes(measured, 1, 2))
+        information[tracked] = self._steps.rows[rows]
         return replace(piece, information=information)
+
+    def _row(self, keyframe: int) -> int:
+        """Row of the step that leads to a keyframe."""
+        step = self._keyframes[keyframe].step
+        assert step is not None, "a tracked edge without a step"
+        known = self._rows.get(keyframe)
+        if known is not None and known[0] is step:
+            return known[1]
+        information = np.linalg.inv(step.drift)
+        self._steps.append(0.5 * (information + information.T))
+        self._rows[keyframe] = step, len(self._steps) - 1
+        return len(self._steps) - 1
