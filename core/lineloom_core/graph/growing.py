@@ -24,14 +24,15 @@ class GrowingArray(Generic[_Scalar]):
     def append(self, row: Any) -> None:
         """Add one row."""
         if self._count == len(self._room):
-            self._room = np.concatenate([self._room, np.empty_like(self._room)])
+            more = np.empty((max(16, self._count), *self._room.shape[1:]), self._room.dtype)
+            self._room = np.concatenate([self._room, more])
         self._room[self._count] = row
         self._count += 1
 
     def keep(self, chosen: Sequence[bool]) -> None:
         """Keep only the rows that are chosen, in their order."""
-        self._room = np.concatenate([self.rows[np.asarray(chosen, dtype=bool)], self._room[:16]])
-        self._count = sum(chosen)
+        self._room = self.rows[np.asarray(chosen, dtype=np.bool_)]
+        self._count = len(self._room)
 
     @property
     def rows(self) -> NDArray[_Scalar]:

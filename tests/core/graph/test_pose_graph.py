@@ -115,6 +115,45 @@ def test_edges_at_a_node_go_with_them() -> None:
     assert graph.piece(1).ends.tolist() == [[0, 1]]
 
 
+def arrays(graph: PoseGraph, node: int) -> list[list[object]]:
+    piece = graph.piece(node)
+    return [
+        getattr(piece, name).tolist()
+        for name in ("ids", "poses", "ends", "measured", "information", "robust")
+    ]
+
+
+def test_a_graph_that_nodes_and_edges_left_is_as_if_they_had_never_been_there() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(30):
+        whole, rest = chain(list(range(12))), PoseGraph()
+        pairs = [sorted(rng.choice(12, 2, replace=False).tolist()) for _ in range(16)]
+        edges = {f"{a}-{b}": link(a, b, Pose(*rng.normal(size=3).tolist())) for a, b in pairs}
+        for edge in edges.values():
+            whole.add_edge(edge)
+        gone = set(rng.choice(12, int(rng.integers(0, 12)), replace=False).tolist())
+        unlinked = next((e.id for e in edges.values() if not gone & {e.node_a, e.node_b}), None)
+        removed = whole.remove_nodes(gone)
+        assert {e.id for e in removed} == {
+            e.id for e in edges.values() if gone & {e.node_a, e.node_b}
+        }
+        if unlinked is not None:
+            assert whole.remove_edge(unlinked).id == unlinked
+        for node in set(range(12)) - gone:
+            rest.add_node(node, Pose(float(node), 0.0, 0.0))
+        for edge in edges.values():
+            if edge not in removed and edge.id != unlinked:
+                rest.add_edge(edge)
+        for twin in (whole, pickle.loads(pickle.dumps(whole))):
+            assert list(twin.edges) == list(rest.edges)
+            assert twin.components() == rest.components()
+            for node in rest.nodes:
+                assert arrays(twin, node) == arrays(rest, node)
+                assert [e.id for e in twin.edges_at(node)] == [e.id for e in rest.edges_at(node)]
+            twin.add_node(99, Pose(1.0, 2.0, 3.0))
+            assert twin.pose(99) == Pose(1.0, 2.0, 3.0)
+
+
 def test_pickles_to_the_same() -> None:
     graph = chain([0, 1, 2])
     graph.add_edge(link(0, 1))
