@@ -128,5 +128,7 @@ class MapperConfig:
     thinning: ThinningConfig = field(default_factory=ThinningConfig)
     fusion: FusionConfig = field(default_factory=FusionConfig)
     persistence: PersistenceConfig = field(default_factory=PersistenceConfig)
+    checkpoint_every: int = 256
+    """Keyframes at least from one `Checkpoints` to the next."""
     least_fit_late: float = 0.6
     """Share of a late scan that must lie on its neighbours' surfaces."""

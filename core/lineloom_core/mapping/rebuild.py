@@ -1,31 +1,38 @@
 """Going through the history again under other verdicts: undo, redo, what-if, second thoughts.
 
-What is retracted leaves no trace, because the map is made anew as if it had never been believed.
-Places and recognitions are remembered, so that this costs little more than solving the graph.
+What is retracted leaves no trace, because the map is made anew as if it had never been believed:
+from the last checkpoint that it cannot have touched. Places and recognitions are remembered, so
+that this costs little more than solving the graph.
 """
 
 from __future__ import annotations
 
 from lineloom_core.mapping.advance import advance
-from lineloom_core.mapping.config import MapperConfig
-from lineloom_core.mapping.history import History
-from lineloom_core.mapping.memory import Memory
+from lineloom_core.mapping.checkpoints import Checkpoints
+from lineloom_core.mapping.constraint import Constraint
 from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.mapping.verdicts import Verdicts
 
 
-def rebuild(config: MapperConfig, history: History, memory: Memory, verdicts: Verdicts) -> SiteMap:
-    """The map that the history gives under these verdicts.
+def rebuild(checkpoints: Checkpoints, verdicts: Verdicts, affected: int) -> SiteMap:
+    """The map that the history gives under these verdicts, the same up to keyframe `affected`.
 
     Where a keyframe contradicts what was believed before it, that is withdrawn and the history
     gone through again. This ends, as every round withdraws at least one constraint more.
     """
     while True:
-        site = SiteMap(config, memory, verdicts)
-        for keyframe in history.keyframes.values():
+        site, keyframes = checkpoints.resume(affected, verdicts)
+        for keyframe in keyframes:
             contradicted = advance(site, keyframe).contradicted
             if contradicted:
                 verdicts = verdicts.withdraw(contradicted)
+                affected = first_affected(contradicted)
                 break
+            checkpoints.note(site, keyframe.id)
         else:
             return site
+
+
+def first_affected(constraints: tuple[Constraint, ...]) -> int:
+    """The first keyframe at which it matters whether one of these is believed."""
+    return min(max(c.keyframe_a, c.keyframe_b) for c in constraints)

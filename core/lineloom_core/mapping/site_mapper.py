@@ -19,6 +19,7 @@ from lineloom_core.fusion.occupancy import Rays
 from lineloom_core.mapping.advance import advance
 from lineloom_core.mapping.answers import Action, Evidence, WhatIf
 from lineloom_core.mapping.changes import Changes
+from lineloom_core.mapping.checkpoints import Checkpoints
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.constraint import Constraint
 from lineloom_core.mapping.explain import explain
@@ -29,7 +30,7 @@ from lineloom_core.mapping.localisation import Localisation
 from lineloom_core.mapping.localise import localise
 from lineloom_core.mapping.memory import Memory
 from lineloom_core.mapping.ray_source import component_rays
-from lineloom_core.mapping.rebuild import rebuild
+from lineloom_core.mapping.rebuild import first_affected, rebuild
 from lineloom_core.mapping.robot_record import RobotRecord
 from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.mapping.site_view import SiteView
@@ -58,6 +59,7 @@ class SiteMapper:
         self._memory = Memory(self._config.recognition)
         self._site = SiteMap(self._config, self._memory, verdicts)
         self._history = History()
+        self._checkpoints = Checkpoints(self._config, self._history, self._memory)
         self._robots: dict[str, RobotRecord] = {}
         self._version = 0
 
@@ -88,6 +90,8 @@ class SiteMapper:
         became = advance(self._site, taken.keyframe)
         if became.contradicted:
             self._rebuild(self._site.verdicts.withdraw(became.contradicted))
+        else:
+            self._checkpoints.note(self._site, taken.keyframe.id)
         return Changes(
             placed=True,
             started_component=f"c{taken.keyframe.track}" if taken.started else None,
@@ -114,7 +118,7 @@ class SiteMapper:
         gone = {k for k, f in self._history.keyframes.items() if f.robot == robot}
         self._history.forget(robot)
         self._memory.forget(gone)
-        self._rebuild(self._site.verdicts.without(gone).operators_only())
+        self._rebuild(self._site.verdicts.without(gone).operators_only(), min(gone, default=None))
 
     def retract(self, constraint: str) -> None:
         """Make the map as if the constraint had never been accepted, for good.
@@ -147,7 +151,7 @@ class SiteMapper:
             if action == "retract"
             else self._site.verdicts.restore(constraint)
         )
-        other = rebuild(self._config, self._history, self._memory, verdicts.operators_only())
+        other = self._rebuilt(self._checkpoints.copy(), verdicts.operators_only())
         return what_if(action, constraint, self._site, other, self._robots)
 
     def explain(self, constraint: str) -> Evidence | None:
@@ -192,6 +196,7 @@ class SiteMapper:
         mapper = cls(config)
         mapper._memory, mapper._history, mapper._site = memory, history, site
         mapper._robots, mapper._version = robots, version
+        mapper._checkpoints = Checkpoints(mapper._config, history, memory)
         return mapper
 
     def _set_apart(self, robot: str, keyframe: Keyframe) -> Changes:
@@ -204,7 +209,9 @@ class SiteMapper:
             and c.kind == "rendezvous"
             and robot in (frames[c.keyframe_a].robot, frames[c.keyframe_b].robot)
         }
-        self._rebuild(self._site.verdicts)
+        session = keyframe.scan.session
+        first = min(k for k, f in frames.items() if (f.robot, f.scan.session) == (robot, session))
+        self._rebuild(self._site.verdicts, first)
         kept = self._site.constraints
         withdrawn = (i for i in sorted(tied) if i not in kept or kept[i].state != "accepted")
         return Changes(
@@ -218,5 +225,14 @@ class SiteMapper:
         gone = constraint.moved_to("retracted", "retracted by an operator", self._version)
         return self._site.verdicts.retract(gone)
 
-    def _rebuild(self, verdicts: Verdicts) -> None:
-        self._site = rebuild(self._config, self._history, self._memory, verdicts)
+    def _rebuild(self, verdicts: Verdicts, affected: int | None = None) -> None:
+        self._site = self._rebuilt(self._checkpoints, verdicts, affected)
+
+    def _rebuilt(
+        self, checkpoints: Checkpoints, verdicts: Verdicts, affected: int | None = None
+    ) -> SiteMap:
+        """The map under other verdicts, and with other keyframes from `affected` on."""
+        first = [first_affected(moved)] if (moved := self._site.verdicts.moved(verdicts)) else []
+        if affected is not None:
+            first.append(affected)
+        return rebuild(checkpoints, verdicts, min(first, default=0))

@@ -58,6 +58,15 @@ class Verdicts:
         """The mapper's own verdicts left aside: they follow from the history anew."""
         return replace(self, withdrawn={})
 
+    def moved(self, other: Verdicts) -> tuple[Constraint, ...]:
+        """Constraints on which the two differ."""
+        groups = ((self.retracted, other.retracted), (self.withdrawn, other.withdrawn))
+        return tuple(
+            {**mine, **theirs}[name]
+            for mine, theirs in groups
+            for name in sorted(mine.keys() ^ theirs.keys())
+        )
+
     def without(self, keyframes: set[int]) -> Verdicts:
         """The same where these keyframes are forgotten."""
 
