@@ -114,6 +114,13 @@ class FakeServer:
                 return _problem(404, "no such address")
             return StreamingResponse(self._events(), media_type="text/event-stream")
 
+        @router.get(f"{_SITE}/floorplan")
+        def floorplan() -> Any:
+            if site.plan is None:
+                return _problem(404, "site 'fake' has no floor plan; PUT one")
+            return site.floorplan(site.plan)
+
+        router.add_api_route(f"{_SITE}/floorplan/differences", site.differences)
         router.add_api_route(_SITE, site.site)
         router.add_api_route(f"{_SITE}/robots", site.robots)
         router.add_api_route(f"{_SITE}/graph", site.graph)

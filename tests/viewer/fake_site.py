@@ -18,6 +18,9 @@ class FakeSite:
     def __init__(self) -> None:
         self.version = 40
         self.joined = False
+        self.trouble: str | None = None
+        self.plan: dict[str, dict[str, float]] | None = None
+        """T_plan_map of the components that have a place in the floor plan."""
         self.constraints = [_candidate("p5-17"), _candidate("p3-15"), _rejected("p1-20")]
 
     def join(self) -> None:
@@ -67,7 +70,26 @@ class FakeSite:
             "components": self._components(),
             "merged_into": {"c1": "c0"} if self.joined else {},
             "constraints": {"rendezvous": counts},
+            "trouble": self.trouble,
         }
+
+    def floorplan(self, plan: dict[str, dict[str, float]]) -> dict[str, Any]:
+        """`GET …/floorplan`."""
+        places = [
+            {
+                "component": c["id"],
+                "verdict": "registered" if c["id"] in plan else "none",
+                "reason": "" if c["id"] in plan else "too little is seen of it",
+                "T_plan_map": plan.get(c["id"]),
+            }
+            for c in self._components()
+        ]
+        return {"site": SITE, "version": self.version, "components": places}
+
+    def differences(self, component: str) -> dict[str, Any]:
+        """`GET …/floorplan/differences`."""
+        missing = {"x1": 4.0, "y1": 5.0, "x2": 4.0, "y2": 11.0, "line": None}
+        return {"component": component, "missing": [missing], "new": []}
 
     def map(self) -> dict[str, Any]:
         """`GET …/map`."""

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from lineloom_core.mapping.site_mapper import SiteMapper
+from lineloom_core.simulation import Fleet, rooms, scanner_360
 from playwright.sync_api import Page
 
 from tests.viewer.fake_server import FakeServer
@@ -101,7 +103,7 @@ def test_arranged_components_never_overlap_and_the_first_stays(run: Run) -> None
             const components = Array.from({ length: n }, (_, i) => {
                 const [x, y] = [random(-30, 30), random(-30, 30)];
                 const bounds = new Bounds(x, y, x + random(0, 40), y + random(0, 40));
-                return { id: `c${i}`, bounds };
+                return { id: `c${i}`, bounds, extent: () => bounds };
             });
             const placement = m.arrange(components, random(0.3, 2));
             const boxes = components.map(({ id, bounds }) => {
@@ -287,3 +289,13 @@ def test_a_line_set_that_was_brought_up_to_date_is_one_made_anew(run: Run) -> No
         """,
     )
     assert differences == []
+
+
+def test_every_check_of_a_constraint_has_a_name(run: Run) -> None:
+    mapper = SiteMapper()
+    for one in Fleet.touring(rooms(0), robots=2, duration_s=60.0, lidar=scanner_360()).scans():
+        mapper.add(one.robot, one.scan)
+    constraints = mapper.view().constraints
+    assert {c.kind for c in constraints} == {"sequential", "loop", "rendezvous"}
+    checks = {name for constraint in constraints for name in constraint.checks}
+    assert sorted(checks - set(run("ui/check_table.js", "return Object.keys(m.CHECKS);"))) == []

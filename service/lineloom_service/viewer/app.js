@@ -8,6 +8,7 @@ import { SiteDirectory } from "./net/site_directory.js";
 import { SiteFeed } from "./net/site_feed.js";
 import { Token } from "./net/token.js";
 import { Selection } from "./selection.js";
+import { FrameControl } from "./tools/frame_control.js";
 import { Localizer } from "./tools/localizer.js";
 import { MapControl } from "./tools/map_control.js";
 import { BlankPage } from "./ui/blank_page.js";
@@ -44,14 +45,16 @@ export class App {
     this.view = new MapView(byId("map"));
     this.view.layers = { ...this.view.layers, ...this.preferences.get("layers", {}) };
     this.notices = new Notices(byId("notices"));
-    this.badge = new StatusBadge(byId("status"));
+    this.badge = new StatusBadge(byId("status"), byId("trouble"));
     this.blank = new BlankPage(byId("blank"));
     this.picker = new SitePicker(byId("site-picker"), (site) => this.open(site));
     this.panel = new SidePanel({
       onPick: (thing) => this.pick(thing, true),
       onLayer: (name, on) => this._switchLayer(name, on),
+      onFrame: (choice) => void this.frames.choose(choice),
       onDownload: (path, name) => this._download(path, name),
     });
+    this.frames = new FrameControl(this);
     this.inspector = new Inspector(byId("inspector"), (id) =>
       this.api.get(`${this._path}/constraints/${encodeURIComponent(id)}`),
     );
@@ -82,6 +85,7 @@ export class App {
     document.title = `${site} – Lineloom`;
     this.history.clear();
     this.localizer.clear();
+    this.frames.open();
     this.view.following = true;
     this.view.show(null);
     this.control.restoreView();
@@ -139,6 +143,7 @@ export class App {
     if (before) for (const news of newsBetween(before, state)) this.notices.say(news);
     if (this.time.isLive) this.view.show(state);
     this.time.update(this.history.moments);
+    void this.frames.follow();
     this._redraw();
   }
 

@@ -7,7 +7,12 @@
  * @returns {string[]}
  */
 export function newsBetween(before, after) {
-  return [...joined(before, after), ...parted(before, after), ...lost(before, after)];
+  return [
+    ...joined(before, after),
+    ...parted(before, after),
+    ...lost(before, after),
+    ...ailing(before, after),
+  ];
 }
 
 /** @param {import("./site_state.js").SiteState} before @param {import("./site_state.js").SiteState} after */
@@ -25,6 +30,13 @@ function parted(before, after) {
   return after.components
     .filter(({ id }) => before.survivorOf(id) !== id)
     .map(({ id, robots }) => `Component ${id} (${robots.join(", ")}) parted from ${before.survivorOf(id)}`);
+}
+
+/** @param {import("./site_state.js").SiteState} before @param {import("./site_state.js").SiteState} after */
+function ailing(before, after) {
+  return after.robots
+    .filter(({ robot, health }) => health.length > 0 && before.robot(robot)?.health.length === 0)
+    .map(({ robot, health }) => `${robot}: ${health[0]}`);
 }
 
 /** @param {import("./site_state.js").SiteState} before @param {import("./site_state.js").SiteState} after */

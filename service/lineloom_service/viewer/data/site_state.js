@@ -60,7 +60,9 @@ export function robotNamesOf(site, robots) {
 }
 
 /**
- * @typedef {{id: string, robots: string[], keyframes: number, bounds: Bounds}} Component
+ * @typedef {{id: string, robots: string[], keyframes: number, bounds: Bounds,
+ *   extent: (theta: number) => Bounds}} Component
+ * extent: the box around it when it is turned.
  */
 
 /** @param {SiteState} state @returns {Component[]} */
@@ -70,7 +72,7 @@ function componentsOf(state) {
   for (const node of state.keyframes.values()) {
     let component = found.get(node.component);
     if (!component) {
-      component = { id: node.component, robots: [], keyframes: 0, bounds: new Bounds() };
+      component = componentOf(state, node.component);
       found.set(node.component, component);
     }
     component.keyframes += 1;
@@ -78,11 +80,45 @@ function componentsOf(state) {
     component.bounds.add(node.x, node.y);
   }
   for (const [id, bounds] of state.lines.bounds) {
-    const component = found.get(id);
-    if (component) component.bounds = component.bounds.union(bounds);
-    else found.set(id, { id, robots: [], keyframes: 0, bounds });
+    const component = found.get(id) ?? componentOf(state, id);
+    component.bounds = component.bounds.union(bounds);
+    found.set(id, component);
   }
   return [...found.values()].sort((a, b) => b.keyframes - a.keyframes || (a.id < b.id ? -1 : 1));
+}
+
+/** @param {SiteState} state @param {string} id @returns {Component} */
+function componentOf(state, id) {
+  /** @type {Map<number, Bounds>} */
+  const extents = new Map();
+  /** @type {Component} */
+  const component = {
+    id,
+    robots: [],
+    keyframes: 0,
+    bounds: new Bounds(),
+    extent: (theta) => {
+      if (theta === 0) return component.bounds;
+      const extent = extents.get(theta) ?? turnedBounds(state, id, theta);
+      extents.set(theta, extent);
+      return extent;
+    },
+  };
+  return component;
+}
+
+/** @param {SiteState} state @param {string} id @param {number} theta */
+function turnedBounds({ keyframes, lines }, id, theta) {
+  const bounds = new Bounds();
+  const [c, s] = [Math.cos(theta), Math.sin(theta)];
+  /** @param {number} x @param {number} y */
+  const add = (x, y) => bounds.add(c * x - s * y, s * x + c * y);
+  for (const node of keyframes.values()) if (node.component === id) add(node.x, node.y);
+  for (const { component, start, end } of lines.groups) {
+    if (component !== id) continue;
+    for (let i = 4 * start; i < 4 * end; i += 2) add(lines.ends[i], lines.ends[i + 1]);
+  }
+  return bounds;
 }
 
 /** Return the robots' ways from keyframe to keyframe, cut where a step is not known. @param {import("../net/contract.js").GraphAnswer} graph @returns {Path[]} */

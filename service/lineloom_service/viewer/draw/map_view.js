@@ -1,3 +1,4 @@
+import { noFrames } from "../data/frames.js";
 import { compose } from "../geometry/pose.js";
 import { Bounds } from "../geometry/bounds.js";
 import { arrange, pageBounds } from "./arrangement.js";
@@ -35,6 +36,9 @@ export class MapView {
     this.state = null;
     /** @type {Map<string, import("../geometry/pose.js").Pose>} */
     this.placement = new Map();
+    this.frames = noFrames();
+    /** @type {(state: SiteState) => import("../data/frames.js").Frames} */
+    this.framesFor = noFrames;
     /** Fit the view to the map as it grows, until the reader moves it. */
     this.following = true;
     /** @type {Thing|null} */
@@ -73,7 +77,8 @@ export class MapView {
   show(state, { glide = true } = {}) {
     const [before, placedBefore] = [this.state, this.placement];
     this.state = state;
-    this.placement = state ? arrange(state.components, this._aspect()) : new Map();
+    if (state) this.frames = this.framesFor(state);
+    this.placement = state ? arrange(state.components, this._aspect(), this.frames) : new Map();
     this._transition = null;
     if (state) {
       const moving = glide && before && before.site.site === state.site.site && !prefersStillness();
@@ -229,7 +234,7 @@ export class MapView {
     if (thing.kind === "component") {
       const found = state.component(thing.id);
       const pose = placement.get(thing.id);
-      return found && pose ? found.bounds.moved(pose.x, pose.y) : bounds;
+      return found && pose ? found.extent(pose.theta).moved(pose.x, pose.y) : bounds;
     }
     if (thing.kind === "line") {
       const line = state.lines.answers[state.lines.indexOf(thing.id)];

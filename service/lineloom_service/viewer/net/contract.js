@@ -7,7 +7,7 @@
  * @typedef {{id: string, robots: string[], keyframes: number}} ComponentAnswer
  * @typedef {{site: string, version: number, idle: boolean, scans: ScanCounts, robots: string[],
  *   components: ComponentAnswer[], merged_into: Object<string, string>,
- *   constraints: Object<string, Object<string, number>>}} SiteAnswer
+ *   constraints: Object<string, Object<string, number>>, trouble?: string|null}} SiteAnswer
  *
  * @typedef {{robot: string, component: string|null, state: "starting"|"tracking"|"lost",
  *   pose: (Pose & {covariance: (number|null)[][]|null})|null, scans: ScanCounts,
@@ -53,6 +53,12 @@
  *   checks: Object<string, number|null>}} HypothesisAnswer
  * @typedef {{verdict: "unique"|"ambiguous"|"unknown", hypotheses: HypothesisAnswer[],
  *   reason: string, scan: number|null}} LocalizeAnswer
+ *
+ * @typedef {{component: string, verdict: "registered"|"ambiguous"|"none", reason: string,
+ *   T_plan_map: Pose|null}} PlacementAnswer
+ * @typedef {{site: string, version: number, components: PlacementAnswer[]}} FloorPlanAnswer
+ * @typedef {{x1: number, y1: number, x2: number, y2: number, line: string|null}} PlanPiece
+ * @typedef {{component: string, missing: PlanPiece[], new: PlanPiece[]}} PlanDifferencesAnswer
  *
  * @typedef {{seq: number, stamp: number, component: string, x: number, y: number,
  *   theta: number}} TrajectoryPose

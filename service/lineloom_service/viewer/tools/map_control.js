@@ -26,6 +26,7 @@ export class MapControl {
     this._reach = window.matchMedia("(pointer: coarse)").matches ? REACH_PX.touch : REACH_PX.mouse;
     const { canvas } = this._view;
     this._view.marks = [
+      { draw: (context, camera, scene) => app.frames.marks.draw(context, camera, scene) },
       { draw: (context, camera, scene) => app.localizer.draw(context, camera, scene) },
       { draw: (context, camera, { palette }) => this._measure.draw(context, camera, palette) },
     ];

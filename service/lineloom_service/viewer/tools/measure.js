@@ -1,3 +1,4 @@
+import { apply, inverse } from "../geometry/pose.js";
 import { drawLabel } from "../draw/label.js";
 import { stroke } from "../draw/highlight_marks.js";
 
@@ -77,8 +78,9 @@ function componentAt({ state, placement }, { x, y }) {
   for (const { id, bounds } of state.components) {
     const pose = placement.get(id);
     if (!pose) continue;
-    const box = bounds.grown(0.5).moved(pose.x, pose.y);
-    if (x >= box.xMin && x <= box.xMax && y >= box.yMin && y <= box.yMax) return id;
+    const at = apply(inverse(pose), x, y);
+    const { xMin, yMin, xMax, yMax } = bounds.grown(0.5);
+    if (at.x >= xMin && at.x <= xMax && at.y >= yMin && at.y <= yMax) return id;
   }
   return null;
 }

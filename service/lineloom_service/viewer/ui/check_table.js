@@ -2,12 +2,12 @@ import { h } from "./dom.js";
 import { degrees, figure, metres, percent } from "./format.js";
 
 /** @type {Record<string, [string, (value: number) => string]>} check -> its name and how to write it */
-const CHECKS = {
+export const CHECKS = {
   matched: ["Points in common", figure],
   conflict: ["Points in free space", figure],
   conflict_share: ["Share in free space", percent],
   own_conflict: ["Clutter of the places", percent],
-  map_conflict: ["Conflict of the maps", percent],
+  missing_share: ["Missing of what stood still", percent],
   fit: ["Fit", figure],
   information: ["Information", figure],
   isotropy: ["Isotropy", figure],
@@ -16,6 +16,9 @@ const CHECKS = {
   margin: ["Margin to runner-up", percent],
   set_size: ["Constraints that agree", figure],
   set_evidence: ["Their evidence", metres],
+  set_missing: ["Missing over all of them", percent],
+  set_doubt: ["The same, if three things more were", percent],
+  map_missing: ["Missing wherever the maps overlap", percent],
   set_distinctive: ["Of them, from places unlike others", figure],
   rival_evidence: ["Evidence of a rival set", metres],
   moved_m: ["Moved by the closure", metres],

@@ -49,6 +49,7 @@ export class FleetList {
     return this._row({ kind: "robot", id: robot.robot }, selected, [
       swatch(palette.robot(state.robotNames.indexOf(robot.robot))),
       h("span", { className: "name" }, robot.robot),
+      ...(robot.health.length > 0 ? [findings(robot.health)] : []),
       h("span", { className: "end", title: robot.state === "tracking" ? "scans in the map" : "" }, words),
     ]);
   }
@@ -67,4 +68,9 @@ export class FleetList {
       ...content,
     );
   }
+}
+
+/** Return a mark that something is wrong with a robot; its card says what. @param {string[]} health */
+function findings(health) {
+  return h("span", { className: "findings", title: health.join("\n") }, plural(health.length, "finding"));
 }

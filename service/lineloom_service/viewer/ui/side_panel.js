@@ -1,6 +1,7 @@
 import { ConstraintList } from "./constraint_list.js";
 import { byId, h, refill } from "./dom.js";
 import { FleetList } from "./fleet_list.js";
+import { FrameChoice } from "./frame_choice.js";
 import { HelpDialog } from "./help_dialog.js";
 import { icon } from "./icon.js";
 import { LayerSwitches } from "./layer_switches.js";
@@ -23,11 +24,16 @@ const EXPORTS = [
  * @typedef {import("../draw/highlight_marks.js").Thing} Thing
  */
 export class SidePanel {
-  /** @param {{onPick: (thing: Thing) => void, onLayer: (name: string, on: boolean) => void, onDownload: (path: string, name: string) => void}} handlers */
-  constructor({ onPick, onLayer, onDownload }) {
+  /**
+   * @param {{onPick: (thing: Thing) => void, onLayer: (name: string, on: boolean) => void,
+   *   onFrame: (choice: import("../data/frames.js").FrameChoice) => void,
+   *   onDownload: (path: string, name: string) => void}} handlers
+   */
+  constructor({ onPick, onLayer, onFrame, onDownload }) {
     this._fleet = new FleetList(byId("fleet"), onPick);
     this._constraints = new ConstraintList(byId("constraints"), onPick, onLayer);
     this._layers = new LayerSwitches(byId("layers"), LAYER_NAMES, onLayer);
+    this.frames = new FrameChoice(byId("frames"), onFrame);
     this._help = new HelpDialog();
     const buttons = EXPORTS.map(([words, format, name]) =>
       h("button", { onclick: () => onDownload(`map?format=${format}`, name) }, words),

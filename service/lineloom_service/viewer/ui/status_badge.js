@@ -15,9 +15,10 @@ const WORDS = {
 
 /** Says in one glance whether what the page shows is current. */
 export class StatusBadge {
-  /** @param {HTMLElement} element */
-  constructor(element) {
+  /** @param {HTMLElement} element @param {HTMLElement} trouble says why a site is not mapped */
+  constructor(element, trouble) {
     this._element = element;
+    this._trouble = trouble;
     this._connection = "connecting";
     /** @type {import("../net/contract.js").SiteAnswer|null} */
     this._site = null;
@@ -32,6 +33,9 @@ export class StatusBadge {
   /** @param {import("../net/contract.js").SiteAnswer|null} site */
   site(site) {
     this._site = site;
+    const trouble = site?.trouble ?? "";
+    this._trouble.hidden = !trouble;
+    if (this._trouble.textContent !== trouble) this._trouble.textContent = trouble;
     this._draw("");
   }
 
@@ -40,7 +44,8 @@ export class StatusBadge {
     let [tone, words] = WORDS[this._connection];
     const pending = this._site?.scans.pending ?? 0;
     const current = this._connection === "live" || this._connection === "polling";
-    if (current && pending > 0) [tone, words] = ["busy", `Mapping, ${count(pending)} scans to go`];
+    if (current && this._site?.trouble) [tone, words] = ["bad", "Not mapped"];
+    else if (current && pending > 0) [tone, words] = ["busy", `Mapping, ${count(pending)} scans to go`];
     const version = this._site ? `version ${count(this._site.version)}` : "";
     this._element.dataset.tone = tone;
     this._element.dataset.connection = this._connection;
