@@ -9,6 +9,7 @@ from fastapi import Depends, FastAPI
 from fastapi.middleware.cors import CORSMiddleware
 
 from lineloom_service import __version__, errors, openapi
+from lineloom_service.body_budget import BodyAdmission
 from lineloom_service.dependencies import admitted
 from lineloom_service.observation.requests import RequestObserver
 from lineloom_service.pacing import IngestPacing
@@ -54,6 +55,7 @@ def create_app(settings: Settings | None = None, *, service: Service | None = No
     viewer.mount(app)
     if served.settings.allow_origins:
         _allow_origins(app, served.settings.allow_origins)
+    app.add_middleware(BodyAdmission, budget=served.bodies)
     app.add_middleware(IngestPacing, pacer=served.pacer)
     # The last one added is the outermost.
     app.add_middleware(RequestObserver, metrics=served.metrics)

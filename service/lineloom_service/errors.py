@@ -53,6 +53,7 @@ BACKLOG_FULL = Kind("backlog-full", 429, "The site has too many scans waiting")
 INTERNAL = Kind("internal", 500, "The service failed")
 NOT_READY = Kind("not-ready", 503, "The service is not ready yet")
 TOO_MANY_STREAMS = Kind("too-many-streams", 503, "Too many listeners already")
+TOO_MUCH_AT_ONCE = Kind("too-much-at-once", 503, "Too many large bodies at a time")
 STORAGE = Kind("storage", 503, "The storage failed")
 _OTHER = Kind("http", 400, "The request was refused")
 

@@ -11,6 +11,7 @@ from fastapi import Request
 from lineloom.wire import JSON, MSGPACK
 from pydantic_core import from_json
 
+from lineloom_service.body_budget import lease_of
 from lineloom_service.errors import (
     MALFORMED_BODY,
     TOO_LARGE,
@@ -46,6 +47,7 @@ async def read_body(request: Request, limit: int) -> Body:
     data = await _read(request, limit)
     if is_gzip:
         data = _gunzip(data, limit)
+        lease_of(request.scope).take(len(data))
     return Body(_decode_json(data) if is_json else _decode_msgpack(data), is_json)
 
 
@@ -53,7 +55,10 @@ async def read_raw(request: Request, limit: int) -> bytes:
     """Return a body of another kind as it is, but decompressed. Raises as `read_body` does."""
     is_gzip = _is_gzip(request)
     data = await _read(request, limit)
-    return _gunzip(data, limit) if is_gzip else data
+    if is_gzip:
+        data = _gunzip(data, limit)
+        lease_of(request.scope).take(len(data))
+    return data
 
 
 def _is_json(request: Request) -> bool:

@@ -7,6 +7,7 @@ import logging
 
 import lineloom_core
 
+from lineloom_service.body_budget import BodyBudget
 from lineloom_service.engine.conductor import Conductor
 from lineloom_service.engine.local_engine import LocalEngine
 from lineloom_service.engine.protocol import Engine
@@ -52,6 +53,7 @@ class Service:
         )
         self.conductor = Conductor(self.store, self.engine, settings, recorder)
         self.pacer = Pacer()
+        self.bodies = BodyBudget(settings.max_bodies_bytes)
         self.maps = MapStore(settings.map_cache_bytes)
         self.store.subscribe_news(self._on_news)
         self.matcher = PairMatcher()

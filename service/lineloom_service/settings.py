@@ -47,6 +47,11 @@ class Settings(BaseSettings):
     )
     workers: int = Field(default_factory=_default_workers, ge=1, le=64)
     max_body_bytes: int = Field(default=MAX_BODY_BYTES, ge=1024)
+    max_bodies_bytes: int = Field(
+        default=8 * MAX_BODY_BYTES,
+        ge=2048,
+        description="Of all bodies that are being read at a time, compressed and plain together.",
+    )
     max_batch: int = Field(default=MAX_BATCH, ge=1, le=MAX_BATCH)
     backlog_limit: int = Field(
         default=20_000, ge=1, description="Log entries of a site waiting to be mapped before 429."
@@ -111,6 +116,12 @@ class Settings(BaseSettings):
     def _check_tls(self) -> Self:
         if (self.ssl_certfile is None) != (self.ssl_keyfile is None):
             raise ValueError("ssl_certfile and ssl_keyfile go together")
+        return self
+
+    @model_validator(mode="after")
+    def _check_bodies(self) -> Self:
+        if self.max_bodies_bytes < 2 * self.max_body_bytes:
+            raise ValueError("max_bodies_bytes must hold one body of max_body_bytes, twice")
         return self
 
     @property

@@ -165,10 +165,15 @@ async def test_out_of_order_batches_are_mapped_in_order(
 async def test_held_scans_are_pending_and_in_time_mapped(
     client: httpx.AsyncClient, site: str, make_scan: Make, idle: Idle
 ) -> None:
+    await post_scans(client, f"{site}-first", make_scan())
+    await idle(f"{site}-first")  # the worker has started
     answer = (await post_scans(client, site, {"scans": [make_scan(s) for s in (0, 2, 4)]})).json()
     assert answer["accepted"] == 3
-    await asyncio.sleep(0.1)
-    now = (await client.get(f"/v1/sites/{site}")).json()
+    for _ in range(100):  # the first one is mapped at once
+        now = (await client.get(f"/v1/sites/{site}")).json()
+        if now["scans"]["processed"]:
+            break
+        await asyncio.sleep(0.01)
     assert now["scans"] == {"accepted": 3, "processed": 1, "pending": 2, "skipped": 0}
     assert not now["idle"]
     robot = (await client.get(f"/v1/sites/{site}/robots/r")).json()

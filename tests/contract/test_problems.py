@@ -83,6 +83,7 @@ async def test_types_are_stable() -> None:
         "storage",
         "too-large",
         "too-many-streams",
+        "too-much-at-once",
         "unauthorized",
         "unknown-component",
         "unknown-constraint",

@@ -20,12 +20,14 @@ import atheris
 import msgpack
 
 with atheris.instrument_imports(include=["lineloom", "lineloom_service", "lineloom_core.scan"]):
+    from lineloom_service.body_budget import LEASE, BodyBudget, BodyLease
     from lineloom_service.errors import ProblemError
     from lineloom_service.intake import take_in
     from lineloom_service.request_body import read_body
     from starlette.requests import Request
 
 _LIMIT = 1 << 20
+_BUDGET = BodyBudget(1 << 62)
 _TYPES = (b"application/json", b"application/msgpack")
 _REFUSED = {400, 413, 415, 422}
 
@@ -41,7 +43,8 @@ def try_one(data: bytes) -> None:
     async def receive() -> dict[str, object]:
         return {"type": "http.request", "body": data[1:], "more_body": False}
 
-    request = Request({"type": "http", "method": "POST", "headers": headers}, receive)
+    scope = {"type": "http", "method": "POST", "headers": headers, LEASE: BodyLease(_BUDGET)}
+    request = Request(scope, receive)
     try:
         _RUNNER.run(_take(request))
     except ProblemError as problem:

@@ -149,6 +149,17 @@ def test_what_makes_no_sense_is_said(tmp_path: Path, arguments: list[str], said:
     assert said in result.stderr
 
 
+def test_the_origins_of_the_command_line_may_call(tmp_path: Path) -> None:
+    origins = "https://a.example,https://b.example"
+    with _served(tmp_path, True, "--allow-origins", origins) as client:
+        for origin, allowed in (
+            ("https://b.example", "https://b.example"),
+            ("https://c.example", None),
+        ):
+            response = client.get("/healthz", headers={"Origin": origin})
+            assert response.headers.get("access-control-allow-origin") == allowed
+
+
 def test_origins_are_read_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("LINELOOM_ALLOW_ORIGINS", "https://a.example, https://b.example")
     assert Settings().allow_origins == ("https://a.example", "https://b.example")

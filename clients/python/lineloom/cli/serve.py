@@ -50,6 +50,13 @@ def serve(
     ssl_keyfile: Annotated[
         Path | None, typer.Option(metavar="FILE", help="The certificate's private key, PEM.")
     ] = None,
+    allow_origins: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ORIGIN,…",
+            help="Origins whose pages may call the service, e.g. https://maps.example; none.",
+        ),
+    ] = None,
     log_level: Annotated[
         str | None,
         typer.Option(metavar="LEVEL", help="debug, info, warning or error; info."),
@@ -87,6 +94,7 @@ def serve(
         "open": open_,
         "ssl_certfile": ssl_certfile,
         "ssl_keyfile": ssl_keyfile,
+        "allow_origins": allow_origins,
         "log_level": log_level,
         "log_format": log_format,
     }
