@@ -28,7 +28,7 @@ from lineloom.wire import MountSettings
 from tests.clients.fake_service import FakeService, problem, read_body, scan
 
 URL = "http://lineloom.test"
-Run = Callable[[str, tuple[Any, ...], dict[str, Any]], Any]
+Run = Callable[..., Any]
 
 
 def make(fake: FakeService, retry: RetryPolicy, **options: Any) -> Client:
@@ -38,18 +38,20 @@ def make(fake: FakeService, retry: RetryPolicy, **options: Any) -> Client:
 
 @pytest.fixture(params=["sync", "async"])
 def run(request: pytest.FixtureRequest, fake: FakeService, quick: RetryPolicy) -> Run:
-    """Call a method by name, of either client."""
+    """Call a method of either client: name, arguments, the client's options; keywords."""
 
-    def sync(name: str, args: tuple[Any, ...], options: dict[str, Any]) -> Any:
+    def sync(name: str, args: tuple[Any, ...], options: dict[str, Any], **asked: Any) -> Any:
         with make(fake, quick, **options) as client:
-            answer = getattr(client, name)(*args)
+            answer = getattr(client, name)(*args, **asked)
             return list(answer) if isinstance(answer, Iterator) else answer
 
-    def asynchronous(name: str, args: tuple[Any, ...], options: dict[str, Any]) -> Any:
+    def asynchronous(
+        name: str, args: tuple[Any, ...], options: dict[str, Any], **asked: Any
+    ) -> Any:
         async def go() -> Any:
             transport = httpx.MockTransport(fake.asynchronous)
             async with AsyncClient(URL, retry=quick, transport=transport, **options) as client:
-                answer = getattr(client, name)(*args)
+                answer = getattr(client, name)(*args, **asked)
                 if isinstance(answer, Awaitable):
                     return await answer
                 return [entry async for entry in answer]
@@ -290,6 +292,18 @@ def test_files_and_texts_come_as_they_are(run: Run, fake: FakeService) -> None:
     assert run("trajectory_text", ("s", "r"), {}) == text
     fake.routes["GET", "/v1/sites/s/graph"] = lambda request: httpx.Response(200, text="VERTEX")
     assert run("graph_g2o", ("s",), {}) == "VERTEX"
+
+
+def test_where_a_robot_was_is_told_in_the_floor_plan(run: Run, fake: FakeService) -> None:
+    pose = {"session": "0", "seq": 1, "stamp": 2.0, "component": "c0"}
+    pose |= {"x": 3.0, "y": 4.0, "theta": 0.5}
+    way = {"robot": "r", "version": 3, "poses": [pose]}
+    fake.routes["GET", "/v1/sites/s/robots/r/trajectory"] = lambda _: httpx.Response(200, json=way)
+    graph = {"graph": {"site": "s", "version": 3}, "nodes": [], "edges": []}
+    fake.routes["GET", "/v1/sites/s/graph"] = lambda _: httpx.Response(200, json=graph)
+    assert run("trajectory", ("s", "r"), {}, frame="plan").poses[0].x == 3.0
+    run("graph", ("s",), {}, align=True)
+    assert [dict(r.url.params) for r in fake.requests] == [{"frame": "plan"}, {"align": "true"}]
 
 
 def test_the_address_comes_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -123,15 +123,23 @@ class AsyncClient:
         """Return one robot at its latest processed scan."""
         return await self._send(calls.robot(site, robot))
 
-    async def trajectory(self, site: str, robot: str) -> Trajectory:
-        """Return the pose of every processed scan."""
-        return await self._send(calls.trajectory(site, robot))
+    async def trajectory(
+        self, site: str, robot: str, *, align: bool = False, frame: MapFrame = "map"
+    ) -> Trajectory:
+        """Return the pose of every processed scan; align and frame as of `map_file`."""
+        return await self._send(calls.trajectory(site, robot, align, frame))
 
     async def trajectory_text(
-        self, site: str, robot: str, format: Literal["tum", "csv"] = "tum"
+        self,
+        site: str,
+        robot: str,
+        format: Literal["tum", "csv"] = "tum",
+        *,
+        align: bool = False,
+        frame: MapFrame = "map",
     ) -> str:
-        """Return the trajectory as text."""
-        return await self._send(calls.trajectory_text(site, robot, format))
+        """Return the trajectory as text; align and frame as of `map_file`."""
+        return await self._send(calls.trajectory_text(site, robot, format, align, frame))
 
     async def transform(self, site: str, robot_a: str, robot_b: str) -> Transform:
         """Return T_a_b; raises ConflictError while the two are not connected."""
@@ -217,13 +225,13 @@ class AsyncClient:
         """Return the differences as a picture."""
         return await self._send(export_calls.floorplan_drawing(site, component, format))
 
-    async def graph(self, site: str) -> Graph:
-        """Return the pose graph."""
-        return await self._send(calls.graph(site))
+    async def graph(self, site: str, *, align: bool = False, frame: MapFrame = "map") -> Graph:
+        """Return the pose graph; align and frame as of `map_file`."""
+        return await self._send(calls.graph(site, align, frame))
 
-    async def graph_g2o(self, site: str) -> str:
-        """Return the pose graph as g2o text."""
-        return await self._send(calls.graph_g2o(site))
+    async def graph_g2o(self, site: str, *, align: bool = False, frame: MapFrame = "map") -> str:
+        """Return the pose graph as g2o text; align and frame as of `map_file`."""
+        return await self._send(calls.graph_g2o(site, align, frame))
 
     async def constraint_page(
         self,

@@ -127,14 +127,18 @@ def robot(site: str, name: str) -> Call[Robot]:
     return Call("GET", _robot(site, name), read_model(Robot))
 
 
-def trajectory(site: str, robot: str) -> Call[Trajectory]:
+def trajectory(site: str, robot: str, align: bool, frame: MapFrame) -> Call[Trajectory]:
     """GET every processed scan's pose."""
-    return Call("GET", f"{_robot(site, robot)}/trajectory", read_model(Trajectory))
+    path, params = f"{_robot(site, robot)}/trajectory", _lying(align, frame)
+    return Call("GET", path, read_model(Trajectory), params=params)
 
 
-def trajectory_text(site: str, robot: str, format: Literal["tum", "csv"]) -> Call[str]:
+def trajectory_text(
+    site: str, robot: str, format: Literal["tum", "csv"], align: bool, frame: MapFrame
+) -> Call[str]:
     """GET the trajectory as text."""
-    return Call("GET", f"{_robot(site, robot)}/trajectory", _text, params={"format": format})
+    params = {"format": format} | _lying(align, frame)
+    return Call("GET", f"{_robot(site, robot)}/trajectory", _text, params=params)
 
 
 def transform(site: str, robot_a: str, robot_b: str) -> Call[Transform]:
@@ -156,23 +160,22 @@ def map_lines(
 def map_file(site: str, format: MapFormat, options: MapOptions) -> Call[bytes]:
     """GET the map as a file."""
     params = _map_params(format, options.component, options.bbox)
-    if options.align:
-        params["align"] = "true"
-    if options.frame != "map":
-        params["frame"] = options.frame
+    params |= _lying(options.align, options.frame)
     if options.resolution is not None:
         params["resolution"] = repr(float(options.resolution))
     return Call("GET", f"{site_path(site)}/map", read_bytes, params=params)
 
 
-def graph(site: str) -> Call[Graph]:
+def graph(site: str, align: bool, frame: MapFrame) -> Call[Graph]:
     """GET the pose graph."""
-    return Call("GET", f"{site_path(site)}/graph", read_model(Graph))
+    params = _lying(align, frame)
+    return Call("GET", f"{site_path(site)}/graph", read_model(Graph), params=params)
 
 
-def graph_g2o(site: str) -> Call[str]:
+def graph_g2o(site: str, align: bool, frame: MapFrame) -> Call[str]:
     """GET the pose graph as g2o text."""
-    return Call("GET", f"{site_path(site)}/graph", _text, params={"format": "g2o"})
+    params = {"format": "g2o"} | _lying(align, frame)
+    return Call("GET", f"{site_path(site)}/graph", _text, params=params)
 
 
 def constraints(
@@ -306,6 +309,11 @@ def read_bytes(response: httpx.Response) -> bytes:
     """Read an answer as it came."""
     raise_for_problem(response)
     return response.content
+
+
+def _lying(align: bool, frame: MapFrame) -> dict[str, str]:
+    """How the map lies, as far as it is not as it was made."""
+    return ({"align": "true"} if align else {}) | ({"frame": frame} if frame != "map" else {})
 
 
 def _map_params(format: str, component: str | None, bbox: Box | None) -> dict[str, str]:

@@ -122,13 +122,23 @@ class Client:
         """Return one robot at its latest processed scan."""
         return self._send(calls.robot(site, robot))
 
-    def trajectory(self, site: str, robot: str) -> Trajectory:
-        """Return the pose of every processed scan."""
-        return self._send(calls.trajectory(site, robot))
+    def trajectory(
+        self, site: str, robot: str, *, align: bool = False, frame: MapFrame = "map"
+    ) -> Trajectory:
+        """Return the pose of every processed scan; align and frame as of `map_file`."""
+        return self._send(calls.trajectory(site, robot, align, frame))
 
-    def trajectory_text(self, site: str, robot: str, format: Literal["tum", "csv"] = "tum") -> str:
-        """Return the trajectory as text."""
-        return self._send(calls.trajectory_text(site, robot, format))
+    def trajectory_text(
+        self,
+        site: str,
+        robot: str,
+        format: Literal["tum", "csv"] = "tum",
+        *,
+        align: bool = False,
+        frame: MapFrame = "map",
+    ) -> str:
+        """Return the trajectory as text; align and frame as of `map_file`."""
+        return self._send(calls.trajectory_text(site, robot, format, align, frame))
 
     def transform(self, site: str, robot_a: str, robot_b: str) -> Transform:
         """Return T_a_b; raises ConflictError while the two are not connected."""
@@ -210,13 +220,13 @@ class Client:
         """Return the differences as a picture."""
         return self._send(export_calls.floorplan_drawing(site, component, format))
 
-    def graph(self, site: str) -> Graph:
-        """Return the pose graph."""
-        return self._send(calls.graph(site))
+    def graph(self, site: str, *, align: bool = False, frame: MapFrame = "map") -> Graph:
+        """Return the pose graph; align and frame as of `map_file`."""
+        return self._send(calls.graph(site, align, frame))
 
-    def graph_g2o(self, site: str) -> str:
-        """Return the pose graph as g2o text."""
-        return self._send(calls.graph_g2o(site))
+    def graph_g2o(self, site: str, *, align: bool = False, frame: MapFrame = "map") -> str:
+        """Return the pose graph as g2o text; align and frame as of `map_file`."""
+        return self._send(calls.graph_g2o(site, align, frame))
 
     def constraint_page(
         self,

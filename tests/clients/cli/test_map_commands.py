@@ -88,6 +88,24 @@ def test_text_goes_to_stdout_and_nothing_else(
     assert fake.requests[-1].url.params["format"] == form
 
 
+@pytest.mark.parametrize(
+    ("options", "params"),
+    [
+        (["--frame", "plan"], {"frame": "plan"}),
+        (["--align"], {"align": "true"}),
+        ([], {}),
+    ],
+)
+def test_trajectory_and_graph_lie_as_the_map_does(
+    options: list[str], params: dict[str, str], loopback: str, fake: FakeService
+) -> None:
+    answers(fake, "GET", f"{SITE}/robots/r1/trajectory", b"")
+    answers(fake, "GET", f"{SITE}/graph", b"")
+    for command, form in ((["trajectory", "r1"], "tum"), (["graph"], "g2o")):
+        assert run(*command, *options, "--url", loopback).exit_code == 0
+        assert dict(fake.requests[-1].url.params) == {"format": form} | params
+
+
 def test_trajectory_and_graph_for_scripts(loopback: str, fake: FakeService) -> None:
     answers(
         fake,

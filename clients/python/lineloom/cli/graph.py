@@ -9,6 +9,7 @@ import typer
 
 from lineloom.cli import options
 from lineloom.cli.deliver import deliver
+from lineloom.cli.map import Align, Frame, FrameOption
 from lineloom.cli.patience import quick
 from lineloom.client import Client
 
@@ -26,6 +27,8 @@ def graph(
     ] = Format.G2O,
     output: options.Output = None,
     site: options.Site = options.DEFAULT_SITE,
+    align: Align = False,
+    frame: FrameOption = Frame.MAP,
     url: options.Url = None,
     token: options.Token = None,
     json: options.Json = False,
@@ -40,7 +43,8 @@ def graph(
     """
     with Client(url, token=token, retry=quick()) as client:
         if json or format is Format.JSON:
-            text = client.graph(site).model_dump_json()
+            found = client.graph(site, align=align, frame=frame.value)
+            text = found.model_dump_json()
         else:
-            text = client.graph_g2o(site)
+            text = client.graph_g2o(site, align=align, frame=frame.value)
     deliver(text.encode(), output)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 from lineloom.cli import options
 from lineloom.cli.deliver import deliver
+from lineloom.cli.map import Align, Frame, FrameOption
 from lineloom.cli.patience import quick
 from lineloom.client import Client
 
@@ -28,6 +29,8 @@ def trajectory(
     ] = Format.TUM,
     output: options.Output = None,
     site: options.Site = options.DEFAULT_SITE,
+    align: Align = False,
+    frame: FrameOption = Frame.MAP,
     url: options.Url = None,
     token: options.Token = None,
     json: options.Json = False,
@@ -42,9 +45,9 @@ def trajectory(
     """
     with Client(url, token=token, retry=quick()) as client:
         if json or format is Format.JSON:
-            text = client.trajectory(site, robot).model_dump_json()
-        elif format is Format.TUM:
-            text = client.trajectory_text(site, robot, "tum")
+            found = client.trajectory(site, robot, align=align, frame=frame.value)
+            text = found.model_dump_json()
         else:
-            text = client.trajectory_text(site, robot, "csv")
+            kind: Literal["tum", "csv"] = "tum" if format is Format.TUM else "csv"
+            text = client.trajectory_text(site, robot, kind, align=align, frame=frame.value)
     deliver(text.encode(), output)
