@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -51,10 +50,7 @@ def robots_by_component(view: SiteView) -> list[set[str]]:
     [
         (CSAIL, 1),
         (CSAIL, 3),
-        *(
-            pytest.param(log, k, marks=pytest.mark.long)
-            for log, k in ((CSAIL, 2), (replace(CSAIL, most_rmse=0.14), 4))
-        ),
+        *(pytest.param(log, k, marks=pytest.mark.long) for log, k in ((CSAIL, 2), (CSAIL, 4))),
         *(pytest.param(FR079, k, marks=pytest.mark.long) for k in (1, 2, 3, 4)),
     ],
     ids=lambda value: value.name if isinstance(value, RealLog) else str(value),

@@ -98,6 +98,18 @@ def judge_points(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def judge_each(points, pose, ranges, angle_min, angle_increment, base, slope, verdicts):  # type: ignore[no-untyped-def]
+    """`judge_point` for every point (n, 2), moved by `pose` into the sweep's frame."""
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    per_radian = 1.0 / angle_increment
+    turn = 2.0 * math.pi * per_radian
+    for k in range(points.shape[0]):
+        x = c * points[k, 0] - s * points[k, 1] + pose[0]
+        y = s * points[k, 0] + c * points[k, 1] + pose[1]
+        verdicts[k] = judge_point(x, y, ranges, angle_min, per_radian, turn, base, slope)
+
+
+@njit(cache=True)
 def thin_points(points, spacing, stride):  # type: ignore[no-untyped-def]
     """Every so many metres of wall one point, (k, 2): each stands for `stride` metres.
 

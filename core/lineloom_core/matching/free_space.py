@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lineloom_core.features import ScanFeatures
 from lineloom_core.geometry import Pose
@@ -47,3 +48,18 @@ def judge_sweeps(
         T_reference_current.to_array(), 1, TOLERANCE, TOLERANCE_SLOPE, counts,
     )  # fmt: skip
     return FreeSpaceCheck(*(float(v) for v in counts))
+
+
+def seen_by(
+    sweep: ScanFeatures, points: NDArray[np.float64], T_sweep_points: Pose
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which of the points (n, 2) a sweep measured, and which it saw through; n each.
+
+    Neither where something stood before a point, or where no beam went or came back.
+    """
+    verdicts = np.empty(len(points), dtype=np.int64)
+    _kernels.judge_each(
+        points, T_sweep_points.to_array(), sweep.ranges, sweep.angle_min, sweep.angle_increment,
+        TOLERANCE, TOLERANCE_SLOPE, verdicts,
+    )  # fmt: skip
+    return verdicts == _kernels.MATCHED, verdicts == _kernels.CONFLICT

@@ -51,9 +51,10 @@ class Cloud:
         """
         sector = np.floor(np.arctan2(self.points[:, 1], self.points[:, 0]) / _SECTOR_RAD)
         first = sector % 2 == 0
-        return self._only(first), self._only(~first)
+        return self.only(first), self.only(~first)
 
-    def _only(self, kept: NDArray[np.bool_]) -> Cloud:
+    def only(self, kept: NDArray[np.bool_]) -> Cloud:
+        """Some of the points, none of them for the search."""
         return Cloud(self.points[kept], self.normals[kept], self.weights[kept], self.sparse[:0])
 
 

@@ -81,7 +81,7 @@ def test_right_odometry_cures_the_plain_corridor(out_of_a_room: list[SimulatedSc
     alone = track_errors(out_of_a_room, follow(out_of_a_room))
     right = faulty(out_of_a_room, lambda i, p, rng: p, 0)
     found = track_errors(right, follow(right))
-    assert alone[-1, 0] > 1.0  # nothing but the wheels can know
+    assert alone[-1, 0] > 0.5  # nothing but the wheels can know
     assert found[:, 0].max() < 0.3
 
 

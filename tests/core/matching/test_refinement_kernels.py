@@ -10,7 +10,7 @@ from lineloom_core.features import ScanFeatures, extract_features
 from lineloom_core.geometry import Pose
 from lineloom_core.matching import _free_space_kernels as free
 from lineloom_core.matching import _refinement_kernels as fast
-from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE, judge_sweeps
+from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE, judge_sweeps, seen_by
 from lineloom_core.simulation import rectangle, scanner_360, sick_lms200
 from numpy.typing import NDArray
 
@@ -129,6 +129,18 @@ def test_points_before_on_and_behind_a_sweep(beams: int, increment: float) -> No
         assert found == slow.judge(point, ranges, angle_min, step, TOLERANCE, TOLERANCE_SLOPE)
         verdicts.append(int(found))
     assert min(np.bincount(verdicts, minlength=4)) > 100
+
+
+def test_what_a_sweep_measured_and_saw_through(feature_pairs: list[FeaturePair]) -> None:
+    for ref, cur, T in feature_pairs:
+        measured, through = seen_by(ref, cur.points, T)
+        verdicts = [
+            slow.judge(T.transform(p), *sweep_of(ref), TOLERANCE, TOLERANCE_SLOPE)
+            for p in cur.points
+        ]
+        off = np.count_nonzero(measured != (np.array(verdicts) == free.MATCHED))
+        off += np.count_nonzero(through != (np.array(verdicts) == free.CONFLICT))
+        assert off <= 2  # one point at a beam's border
 
 
 def test_a_beam_without_return_is_never_free_space() -> None:

@@ -1,0 +1,96 @@
+"""The last keyframes of a track: a local map to follow the robot by, and what in it stood still.
+
+A person who walks before the robot looks like a piece of wall that comes along. Between two plain
+walls that piece would be all there is to tell the way by, and the robot seem to stand. So a point
+counts as steady once another keyframe has measured it where it was, and hardly any has seen through
+it. Somebody who walks is measured nowhere twice.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lineloom_core.features import ScanFeatures
+from lineloom_core.geometry import Pose
+from lineloom_core.matching.free_space import seen_by
+from lineloom_core.matching.local_map import Cloud, LocalMap
+
+_MOST_MISSES = 0.25  # times as often as a steady point was measured it may have been seen through
+
+
+@dataclass(eq=False)
+class _Kept:
+    """A keyframe in the track's frame; by how many others each point was measured, seen through."""
+
+    features: ScanFeatures
+    cloud: Cloud
+    pose: Pose
+    hits: NDArray[np.int64]
+    misses: NDArray[np.int64]
+
+    def hold_against(self, other: _Kept) -> None:
+        """Count what the other keyframe says of this one's points."""
+        measured, through = seen_by(
+            other.features, self.cloud.points, other.pose.between(self.pose)
+        )
+        self.hits += measured
+        self.misses += through
+
+    @property
+    def steady(self) -> NDArray[np.bool_]:
+        """Which points stood still."""
+        still: NDArray[np.bool_] = (self.hits > 0) & (self.misses <= _MOST_MISSES * self.hits)
+        return still
+
+
+class Recent:
+    """Up to `most` keyframes, the latest `compared` of which are held against each other."""
+
+    def __init__(self, compared: int, most: int) -> None:
+        self._compared = compared
+        self._kept: deque[_Kept] = deque(maxlen=most)
+        self._depth = compared
+        self._build()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The maps are a function of the keyframes: left out."""
+        kept = {"map", "steady"}
+        return {k: v for k, v in self.__dict__.items() if k not in kept}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._build()
+
+    def __len__(self) -> int:
+        return len(self._kept)
+
+    @property
+    def latest(self) -> tuple[ScanFeatures, Pose]:
+        """The latest keyframe and its pose in the track's frame."""
+        return self._kept[-1].features, self._kept[-1].pose
+
+    def add(self, features: ScanFeatures, cloud: Cloud, pose: Pose, *, depth: int) -> None:
+        """Append a keyframe; the local map is of the latest `depth` from now on."""
+        none = np.zeros(len(cloud.points), dtype=np.int64)
+        new = _Kept(features, cloud, pose, none, none.copy())
+        for old in islice(reversed(self._kept), self._compared - 1):
+            old.hold_against(new)
+            new.hold_against(old)
+        self._kept.append(new)
+        self._depth = depth
+        self._build()
+
+    def _build(self) -> None:
+        latest = list(islice(reversed(self._kept), self._depth))
+        self.map = LocalMap.build((k.cloud, k.pose) for k in latest)
+        """All that was seen."""
+        self.steady = LocalMap.build(
+            ((k.cloud.only(k.steady), k.pose) for k in latest), searchable=False
+        )
+        """What stood still."""
