@@ -22,7 +22,8 @@ from lineloom_core.mapping.constraint import step_information
 from lineloom_core.mapping.drift import step_drift
 from lineloom_core.mapping.history import History
 from lineloom_core.mapping.keyframe import Keyframe, Step
-from lineloom_core.mapping.robot_record import PlacedScan, RobotRecord
+from lineloom_core.mapping.placed_scans import PlacedScan
+from lineloom_core.mapping.robot_record import RobotRecord
 from lineloom_core.mapping.tracker import Tracked, Tracker
 from lineloom_core.matching.local_map import Cloud, LocalMap
 from lineloom_core.scan import Scan
@@ -125,7 +126,7 @@ def _laser_odometry(record: RobotRecord, scan: Scan) -> Pose | None:
 def _unplaced(record: RobotRecord) -> Taken:
     """The latest scan has no pose: say so, until one has."""
     record.unplaced += 1
-    if record.placed:
+    if len(record.placed):
         record.state = "lost"
     return Taken(placed=False)
 

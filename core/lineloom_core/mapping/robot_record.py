@@ -4,22 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from lineloom_core.geometry import Pose
 from lineloom_core.health import SensorDoctor
+from lineloom_core.mapping.placed_scans import PlacedScan, PlacedScans
 from lineloom_core.mapping.site_view import RobotState
 from lineloom_core.mapping.tracker import Tracker
 from lineloom_core.scan import Mount
-
-
-@dataclass(frozen=True, slots=True)
-class PlacedScan:
-    """A processed scan, fixed to the keyframe it was tracked against."""
-
-    session: str
-    seq: int
-    stamp: float
-    keyframe: int
-    T_keyframe_laser: Pose
 
 
 @dataclass
@@ -41,7 +30,7 @@ class RobotRecord:
     stamp: float | None = None
     processed: int = 0
     unplaced: int = 0
-    placed: list[PlacedScan] = field(default_factory=list)
+    placed: PlacedScans = field(default_factory=PlacedScans)
     latest: PlacedScan | None = None
     doctor: SensorDoctor = field(default_factory=SensorDoctor)
     distrusted: str = ""

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from lineloom_core.geometry.angles import wrap_array
 from lineloom_core.graph import Covariances, in_map_axes
 from lineloom_core.mapping.map_lines import fused_lines
+from lineloom_core.mapping.placed_scans import names_of
 from lineloom_core.mapping.robot_record import RobotRecord
 from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.mapping.site_view import (
@@ -83,16 +84,17 @@ def _covariance(site: SiteMap, keyframe: int) -> NDArray[np.float64]:
 
 def _trajectory(site: SiteMap, record: RobotRecord, component_of: dict[int, str]) -> TrajectoryView:
     placed = record.placed
-    anchors = np.array([site.pose(p.keyframe).to_array() for p in placed]).reshape(-1, 3)
-    steps = np.array([p.T_keyframe_laser.to_array() for p in placed]).reshape(-1, 3)
+    keyframes, of = np.unique(placed.keyframes, return_inverse=True)
+    anchors = np.array([site.pose(k).to_array() for k in keyframes.tolist()]).reshape(-1, 3)
+    components = [component_of[site.resting.on(k)[0]] for k in keyframes.tolist()]
     base = record.mount.T_base_laser.inverse().to_array()
-    poses = _compose(_compose(anchors, steps), np.broadcast_to(base, steps.shape))
+    in_map = _compose(anchors[of], placed.steps)
     return TrajectoryView(
-        session=tuple(p.session for p in placed),
-        seq=np.array([p.seq for p in placed], dtype=np.int64),
-        stamp=np.array([p.stamp for p in placed], dtype=np.float64),
-        component=tuple(component_of[site.resting.on(p.keyframe)[0]] for p in placed),
-        poses=poses,
+        session=placed.sessions,
+        seq=placed.seq,
+        stamp=placed.stamps,
+        component=names_of(components, of),
+        poses=_compose(in_map, np.broadcast_to(base, in_map.shape)),
     )
 
 
