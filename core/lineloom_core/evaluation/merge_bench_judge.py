@@ -153,7 +153,8 @@ def _tracks(view: SiteView) -> dict[int, list[KeyframeView]]:
     chain = nx.Graph()
     frames = {k.id: k for k in view.keyframes}
     chain.add_nodes_from(frames)
-    chain.add_edges_from(_ends(c) for c in view.constraints if c.kind == "sequential")
+    steps = (c for c in view.constraints if c.kind == "sequential" and c.state == "accepted")
+    chain.add_edges_from(_ends(c) for c in steps)
     pieces = (sorted(piece) for piece in nx.connected_components(chain))
     return {piece[0]: [frames[k] for k in piece] for piece in pieces}
 

@@ -5,9 +5,10 @@ way; 2. of more than `most_alike`, choose those to let go: neither the oldest, w
 things stand there, nor the latest, which say how they stand now; 3. take them out of recognition,
 and their keyframes out of the graph and out of the fused lines, unless another place needs them.
 
-A meeting of two maps is never let go, nor are the places that it was seen in, and neither is the
-keyframe that a component is named after. The history keeps all keyframes, so that what is undone is
-undone as if it had never been believed. Poses of what was let go stay known to the trajectory.
+A meeting of two maps is never let go, nor are the places that it was seen in, and neither are the
+ends of what was retracted or withdrawn, nor the keyframe that a component is named after. The
+history keeps all keyframes, so that what is undone is undone as if it had never been believed.
+Poses of what was let go stay known to the trajectory.
 """
 
 from __future__ import annotations
@@ -56,11 +57,14 @@ def _may_go(site: SiteMap, place: Place) -> bool:
     driven = track.travelled[-1] - track.travelled[track.position(place.id)]
     if site.is_latest(track) and driven < site.config.thinning.apart:
         return False
-    return not any(_holds_a_meeting(site, k) for k in place.keyframes)
+    return not any(_holds_something(site, k) for k in place.keyframes)
 
 
-def _holds_a_meeting(site: SiteMap, keyframe: int) -> bool:
-    return any(edge.kind == "rendezvous" for edge in site.graph.edges_at(keyframe))
+def _holds_something(site: SiteMap, keyframe: int) -> bool:
+    """Whether a meeting rests on a keyframe, or a verdict, which somebody may look at again."""
+    if any(edge.kind == "rendezvous" for edge in site.graph.edges_at(keyframe)):
+        return True
+    return any(keyframe in (c.keyframe_a, c.keyframe_b) for c in site.verdicts.all_barred())
 
 
 def _unneeded(site: SiteMap, gone: list[Place]) -> list[list[int]]:
@@ -84,7 +88,7 @@ def _unneeded(site: SiteMap, gone: list[Place]) -> list[list[int]]:
             k
             for k in sorted(along - {root})
             if not any(first <= k <= last for first, last in stretches)
-            and not _holds_a_meeting(site, k)
+            and not _holds_something(site, k)
         )
         runs.extend(_runs(track, unneeded))
     return runs

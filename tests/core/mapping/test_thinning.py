@@ -239,6 +239,9 @@ def test_undo_in_a_thinned_map_is_as_if_it_had_never_been_believed(
         if c.kind == "rendezvous" and c.state == "accepted" and c.id.startswith("p")
     )
     mapper.retract(name)
+    view = mapper.view()
+    shown = {k.id for k in view.keyframes}
+    assert all({c.keyframe_a, c.keyframe_b} <= shown for c in view.constraints)
     never = SiteMapper(TIGHT, verdicts=mapper.verdicts)
     feed(never, long_drive[:so_far])
     views = [replace(m.view(), version=0) for m in (mapper, never)]
