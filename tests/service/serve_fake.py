@@ -16,7 +16,13 @@ from lineloom_service.settings import Settings
 
 
 def _serve(directory: Path, port: int) -> None:
-    settings = Settings(data_dir=directory, gap_window_s=0.2, snapshot_every=100, port=port)
+    settings = Settings(
+        data_dir=directory,
+        database_url=os.environ.get("SERVER_DATABASE_URL"),
+        gap_window_s=0.2,
+        snapshot_every=100,
+        port=port,
+    )
     mapper = os.environ.get("SERVER_MAPPER", "fake_mapper:FakeMapper")
     engine = LocalEngine(1, publish_every_s=0.1, mapper=mapper, warm_up=None)
     log.configure("warning", "text")
