@@ -74,7 +74,7 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
     named = {robot.name: f"r{number}" for number, robot in enumerate(fleet.robots, start=1)}
     drive = [(named[one.robot], one.scan) for one in fleet.scans()]
     with ChildService(tmp_path_factory.mktemp("service")) as service:
-        service.wait_until_ready()
+        service.wait_until_ready(600.0)
         with Client(service.url) as client:
             # In two parts, so that there are two components in between for all to see.
             for part in (drive[:200], drive[200:-40]):

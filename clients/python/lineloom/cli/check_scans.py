@@ -102,7 +102,8 @@ def _mapped(name: str, stream: Stream) -> Iterator[Finding]:
         yield noted(f"{name}map", "not tried: the core is not installed here")
         return
     trial = trial_map(stream, _MOST_MAPPED)
-    found = f"{trial.placed} of the first {trial.scans} scans have a place, in {trial.parts} pieces"
+    pieces = "one piece" if trial.parts == 1 else f"{trial.parts} pieces"
+    found = f"{trial.placed} of the first {trial.scans} scans have a place, in {pieces}"
     if trial.placed < 0.8 * trial.scans:
         advice = "are the beams' angles and directions right? See the other findings"
         yield wrong(f"{name}map", found, advice)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from lineloom.cli.console import note
 from lineloom.client import Client
 from lineloom.retry import RetryPolicy
 
-_WARM_UP_S = 60.0
+_WARM_UP_S = 600.0
 
 
 def quick() -> RetryPolicy:
@@ -21,4 +22,5 @@ def patient() -> RetryPolicy:
 def require_ready(client: Client) -> None:
     """Raise ConnectionFailedError at once where nothing answers; let a service warm up."""
     if not client.ready().ready:
+        note("The service is warming up; its first start on a machine compiles for a minute or so.")
         client.wait_until_ready(_WARM_UP_S)
