@@ -22,12 +22,10 @@ from tests.benchmarks.map_files import occupancy
 from tests.benchmarks.queries import queries
 from tests.benchmarks.restart import restarting
 from tests.benchmarks.row import Row, table
-from tests.benchmarks.scans import csail
+from tests.benchmarks.scans import DATA, csail
 from tests.benchmarks.single_scans import extraction, matching
 from tests.benchmarks.sizes import growth
 from tests.benchmarks.soak import QUICK_SHARE, SHARE, soaking
-
-DATA = Path(__file__).parents[3] / "shared" / "data"
 
 
 def measure(data: Path, *, quick: bool, http: bool) -> list[Row]:
@@ -39,7 +37,7 @@ def measure(data: Path, *, quick: bool, http: bool) -> list[Row]:
     _tell("pairs of scans")
     rows += matching(data, quick=quick)
     _tell("sizes of maps")
-    rows += growth(quick=quick)
+    rows += growth(data, quick=quick)
     _tell("maps as files")
     rows += occupancy(quick=quick)
     if http:

@@ -14,6 +14,9 @@ from lineloom_core.simulation import FreeSpace, Lidar, office_floor, sick_lms200
 
 ScanPair = tuple[Scan, Scan]
 
+DATA = Path(__file__).parents[3] / "shared" / "data"
+"""Folder of the real data."""
+
 
 def office_scans(lidar: Lidar, count: int) -> list[Scan]:
     """Scans from random places on an office floor."""

@@ -63,6 +63,6 @@ def test_the_benchmark_runs_without_data_and_prints_json(tmp_path: Path) -> None
     )
     rows = json.loads(done.stdout)["rows"]
     assert {row["name"].split(",")[0] for row in rows} == {
-        *("features", "graph", "map", "pair", "place"),
+        *("features", "graph", "map", "pair", "place", "scan"),
     }
     assert all(row["ratio"] > 0.0 for row in rows)

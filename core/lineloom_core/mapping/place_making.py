@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 
 from lineloom_core.mapping.config import PlaceConfig
@@ -19,7 +20,7 @@ def place_is_due(track: Track, config: PlaceConfig) -> bool:
 def recent_keyframes(track: Track, config: PlaceConfig) -> list[int]:
     """The keyframes of the last `span` metres, thinned to at most `most_keyframes`."""
     start = track.travelled[-1] - config.span
-    members = [k for k, at in zip(track.keyframes, track.travelled, strict=True) if at >= start]
+    members = track.keyframes[bisect_left(track.travelled, start) :]
     while len(members) > config.most_keyframes:
         members = members[::2]
     return members

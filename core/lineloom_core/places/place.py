@@ -226,9 +226,10 @@ def count_steady(reference: Place, current: Place, T_reference_current: Pose) ->
     stood still for one robot and was not there for the other. Two views of one room differ by a
     door or a chair; two rooms that look alike differ by all that stands in them.
     """
-    there = _tally(reference, current.surface.points, T_reference_current)[current.steady]
-    here = _tally(current, reference.surface.points, T_reference_current.inverse())
-    tally = np.concatenate([there, here[reference.steady]])
+    theirs, ours = (place.surface.points[place.steady] for place in (current, reference))
+    there = _tally(reference, theirs, T_reference_current)
+    here = _tally(current, ours, T_reference_current.inverse())
+    tally = np.concatenate([there, here])
     hits, misses = tally[:, 0], tally[:, 1]
     matched = np.count_nonzero((hits > 0) & (hits >= misses))
     return int(matched), int(np.count_nonzero((misses >= 2) & (misses >= 3 * hits)))
