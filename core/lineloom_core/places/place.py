@@ -197,15 +197,9 @@ def count_points(
     reference: Place, current: Place, T_reference_current: Pose
 ) -> tuple[float, float]:
     """Points (cells of 0.1 m) that both places saw, and those in the other's free space."""
-    counts = np.empty(4)
-    _kernels.judge_places(
-        reference.surface.points, reference.ranges, reference.angle_mins,
-        reference.angle_increments, reference.sweep_poses,
-        current.surface.points, current.ranges, current.angle_mins,
-        current.angle_increments, current.sweep_poses,
-        T_reference_current.to_array(), 1, TOLERANCE, TOLERANCE_SLOPE, counts,
-    )  # fmt: skip
-    return float(counts[0]), float(counts[1])
+    hits, misses = np.concatenate(_both_tallies(reference, current, T_reference_current)).T
+    matched = (hits > 0) & (hits >= misses)
+    return float(np.count_nonzero(matched)), float(np.count_nonzero(~matched & (misses > 0)))
 
 
 def share_explained(reference: Place, current: Place, T_reference_current: Pose) -> float:
@@ -226,13 +220,19 @@ def count_steady(reference: Place, current: Place, T_reference_current: Pose) ->
     stood still for one robot and was not there for the other. Two views of one room differ by a
     door or a chair; two rooms that look alike differ by all that stands in them.
     """
-    theirs, ours = (place.surface.points[place.steady] for place in (current, reference))
-    there = _tally(reference, theirs, T_reference_current)
-    here = _tally(current, ours, T_reference_current.inverse())
-    tally = np.concatenate([there, here])
-    hits, misses = tally[:, 0], tally[:, 1]
+    there, here = _both_tallies(reference, current, T_reference_current)
+    hits, misses = np.concatenate([there[current.steady], here[reference.steady]]).T
     matched = np.count_nonzero((hits > 0) & (hits >= misses))
     return int(matched), int(np.count_nonzero((misses >= 2) & (misses >= 3 * hits)))
+
+
+@lru_cache(maxsize=1)  # recognition asks for both counts of one pair at one pose
+def _both_tallies(
+    reference: Place, current: Place, T_reference_current: Pose
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """`_tally` of the current place's points in the reference, and of the reference's in it."""
+    there = _tally(reference, current.surface.points, T_reference_current)
+    return there, _tally(current, reference.surface.points, T_reference_current.inverse())
 
 
 def _tally(
