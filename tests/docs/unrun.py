@@ -1,4 +1,4 @@
-"""What of the docs the tests do not run, why, and how many commands each reason holds back."""
+"""What of the docs the tests do not run, why, and of how many commands each reason is."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from tests.docs.pages import Command
 
 @dataclass(frozen=True, slots=True)
 class Unrun:
-    """Commands of the sh blocks that begin with `start` (a regular expression)."""
+    """Commands that begin with `start` (a regular expression); count: None for any number."""
 
     start: str
-    count: int
+    count: int | None
     why: str
 
     def holds(self, command: Command) -> bool:
@@ -30,13 +30,13 @@ UNRUN = (
 )
 
 UNRUN_SPANS = (
-    Unrun(r".*(…|[A-Z]{2,}|\bA B\b)", 9, "a placeholder, not a command"),
-    Unrun(r"lineloom serve", 6, "runs in the blocks"),
-    Unrun(r"lineloom demo", 1, "tests/clients/cli/test_demo.py runs it"),
-    Unrun(r"lineloom bench", 5, "minutes; tests/core/evaluation runs parts"),
-    Unrun(r"lineloom experiment", 2, "minutes; tests/core/experiments runs them"),
+    Unrun(r".*(…|[A-Z]{2,}|\bA B\b)", None, "a placeholder, not a command"),
+    Unrun(r"lineloom serve", None, "runs in the blocks"),
+    Unrun(r"lineloom demo", None, "tests/clients/cli/test_demo.py runs it"),
+    Unrun(r"lineloom bench", None, "minutes; tests/core/evaluation runs parts"),
+    Unrun(r"lineloom experiment", None, "minutes; tests/core/experiments runs them"),
 )
-"""Likewise of the commands within the text."""
+"""Likewise of the commands within the text, which come and go: none is counted."""
 
 
 def why_not(command: Command, among: tuple[Unrun, ...]) -> Unrun | None:
