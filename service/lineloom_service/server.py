@@ -24,7 +24,10 @@ from lineloom_service.service import Service
 from lineloom_service.settings import Settings
 from lineloom_service.store.records import StoreError
 
+_LOG = logging.getLogger(__name__)
+
 _SHUTDOWN_S = 5
+_CLOSE_S = 5
 _LOOK_EVERY_S = 0.5
 _SWITCH_S = 0.001
 """How long a thread that renders or writes has the interpreter while an answer waits for it."""
@@ -88,10 +91,32 @@ async def serve(service: Service) -> None:
         listening = config.bind_socket()
         _drop_the_deaf(listening, settings.slow_reader_s)
         with _signals_end_only_the_serving():
-            await uvicorn.Server(config).serve(sockets=[listening])
+            await _Server(config, service).serve(sockets=[listening])
     finally:
         freezing.cancel()
-        await service.stop()
+        await _stop(service)
+
+
+class _Server(uvicorn.Server):
+    """Uvicorn waits for every answer to end, and those of listeners to events have no end."""
+
+    def __init__(self, config: uvicorn.Config, service: Service) -> None:
+        super().__init__(config)
+        self._service = service
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Let the listeners go first."""
+        self._service.events.stop()
+        await super().shutdown(sockets)
+
+
+async def _stop(service: Service) -> None:
+    """Save and close, within bounds: a database that does not answer must not keep us."""
+    try:
+        async with asyncio.timeout(service.settings.stop_grace_s + _CLOSE_S):
+            await service.stop()
+    except TimeoutError:
+        _LOG.warning("stopped before all was closed; what was acknowledged is on the disk")
 
 
 @contextlib.contextmanager

@@ -57,6 +57,11 @@ def test_every_variable_is_a_setting() -> None:
     assert {name for name in told if name.startswith("LINELOOM_")} <= known
 
 
+def test_there_is_time_to_stop() -> None:
+    given = COMPOSE["services"]["worker"]["stop_grace_period"]
+    assert int(given.removesuffix("s")) > Settings().stop_grace_s + 5 + 5  # as server.py has them
+
+
 def test_compose_has_a_service_a_worker_and_a_database() -> None:
     services = COMPOSE["services"]
     assert set(services) == {"database", "service", "worker"}

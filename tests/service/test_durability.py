@@ -128,6 +128,27 @@ def test_it_stops_while_the_matcher_is_being_compiled(tmp_path: Path) -> None:
         assert process.wait(60) == 0
 
 
+def test_it_stops_although_the_database_does_not_answer(tmp_path: Path) -> None:
+    environment = {"SERVER_HANGS": "yes", "LINELOOM_STOP_GRACE_S": "0"}
+    with server(tmp_path, free_port(), **environment) as process:
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(60) == 0
+
+
+def test_listeners_are_let_go_when_it_stops(tmp_path: Path) -> None:
+    port = free_port()
+    url = f"http://127.0.0.1:{port}/v1/sites/s"
+    with server(tmp_path, port) as process, httpx.Client(timeout=60.0) as client:
+        client.post(f"{url}/robots/r/scans", json=_scan(0)).raise_for_status()
+        with client.stream("GET", f"{url}/events") as listened:
+            lines = listened.iter_lines()
+            next(lines)
+            process.send_signal(signal.SIGTERM)
+            for _ in lines:  # to the end: an answer broken off raises
+                pass
+        assert process.wait(60) == 0
+
+
 def test_it_ends_at_once_where_the_port_is_taken(tmp_path: Path) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))

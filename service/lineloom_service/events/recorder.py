@@ -112,8 +112,7 @@ class EventRecorder:
 
     async def stop(self) -> None:
         """Write what is waiting, and let the listeners go."""
-        for site_id in list(self._histories):
-            await self.settled(site_id)
+        await asyncio.gather(*(self.settled(site_id) for site_id in self._histories))
         self._hub.stop()
 
     async def _record(self, site_id: int, history: _History) -> None:
