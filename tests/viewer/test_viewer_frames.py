@@ -39,6 +39,10 @@ def test_the_map_is_shown_in_the_floor_plan_and_still_after_a_reload(
     # The room is six by four metres, the one without a place lies below it.
     assert placed["c1"]["y"] + 4.0 < T_PLAN_C0["y"]
     assert len(page.evaluate("() => lineloom.frames.marks.found.missing")) == 1
+    with page.expect_download() as download, page.expect_request("**/map?*") as asked:
+        page.get_by_role("button", name="DXF").click()
+    assert asked.value.url.endswith("/map?format=dxf&frame=plan")
+    assert download.value.suggested_filename == "map.dxf"
     page.reload()
     page.wait_for_function("() => lineloom.frames.marks.found !== null")
     assert placement(page)["c0"] == pytest.approx(T_PLAN_C0)

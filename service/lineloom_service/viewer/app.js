@@ -239,10 +239,10 @@ export class App {
     this._feed?.refresh();
   }
 
-  /** @param {string} path within the site @param {string} name of the file */
+  /** Save a file in the coordinates that the map is shown in. @param {string} path within the site @param {string} name of the file */
   async _download(path, name) {
     try {
-      await saveFile(await this.api.open(`${this._path}/${path}`), name);
+      await saveFile(await this.api.open(`${this._path}/${path}${this.frames.query}`), name);
     } catch (error) {
       this.notices.say(/** @type {Error} */ (error).message, "bad");
     }

@@ -61,6 +61,11 @@ export class FrameControl {
     }
   }
 
+  /** What asks the service for files in the same coordinates. */
+  get query() {
+    return { map: "", walls: "&align=true", plan: "&frame=plan" }[this.choice];
+  }
+
   get _key() {
     return `frame ${this._app.site}`;
   }

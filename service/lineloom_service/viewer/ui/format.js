@@ -6,6 +6,7 @@ export function count(value) {
 /** @param {number} value */
 export function metres(value) {
   if (Math.abs(value) >= 100) return `${count(Math.round(value))} m`;
+  if (value === 0) return "0 m";
   return Math.abs(value) < 1 ? `${(100 * value).toFixed(1)} cm` : `${value.toFixed(2)} m`;
 }
 
