@@ -24,7 +24,7 @@ from tests.benchmarks.saved_sites import log_bytes, saved_bytes
 from tests.benchmarks.soak_watch import look
 
 LIDARS = {"sick-lms200": sick_lms200, "scanner-360": scanner_360}
-SCANS = (1000, 5000, 20000)
+SCANS = (1000, 5000, 10000)
 _SETTINGS = {"LINELOOM_SNAPSHOT_IDLE_S": "0.5", "LINELOOM_WORKERS": "1"}
 _TICKS = os.sysconf("SC_CLK_TCK")
 _KIB, _MIB = 1024.0, 1024.0**2

@@ -36,7 +36,9 @@ def test_axe_finds_nothing_to_complain_of(
     fake: FakeServer, new_page: Callable[..., Page], scheme: str
 ) -> None:
     page = new_page(color_scheme=scheme, bypass_csp=True)
+    fake.site.trouble = "its log cannot be read"
     open_viewer(page, fake.url, SITE)
+    expect(page.get_by_role("alert")).to_be_visible()
     assert page.evaluate("() => document.documentElement.dataset.theme") == scheme
     assert violations(page) == []
     page.goto(f"{fake.url}/?site={SITE}#constraint/p1-20")
@@ -56,7 +58,12 @@ def test_axe_finds_nothing_on_a_phone_or_on_an_empty_page(
     expect(page.get_by_role("heading", name="No site yet")).to_be_visible()
     assert violations(page) == []
     fake.exists = True
+    fake.site.trouble = "its log cannot be read: the database's file is damaged at page 17"
     expect_components(page, "c0", "c1")
+    tools, alert = (page.locator(name).bounding_box() for name in ("#tools", "#trouble"))
+    assert tools is not None
+    assert alert is not None
+    assert tools["y"] + tools["height"] <= alert["y"]
     page.get_by_role("button", name="Fleet, constraints, layers").tap()
     expect(page.locator("#side")).to_be_visible()
     assert violations(page) == []
