@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import asyncio
 import re
+import warnings
 from collections import Counter
 from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
@@ -38,7 +40,7 @@ FORGETS = "service/docs/api.md"
 """The page that deletes the site in the end comes last."""
 DATABASE = "postgresql+asyncpg://lineloom:secret@db/lineloom"
 TOKEN_ID = "1f0c2a9b77de"
-PAGES = sorted({b.page for b in blocks("sh") + blocks("python")}, key=lambda p: (p == FORGETS, p))
+PAGES = sorted({block.page for block in blocks("sh")})
 PYTHON_PRINTS = {
     "clients/python/README.md": r"(?s)^r1 c0 .*c1 joined c0 by \['",
     "core/README.md": r"^$",
@@ -107,6 +109,36 @@ def database() -> Iterator[str | None]:
         runner.run(context.__aexit__(None, None, None))
 
 
+@pytest.fixture(scope="module")
+def outcomes(
+    stage: Stage, database: str | None, tmp_path_factory: pytest.TempPathFactory
+) -> dict[str, Future[list[shell.Done]]]:
+    """What became of each page's shell commands. Two pages at a time: most of it is waiting."""
+
+    def run(page: str) -> list[shell.Done]:
+        folder = tmp_path_factory.mktemp("page")
+        furnish(folder, rooms(0), stage.rest)
+        return _run_page(page, stage, database, folder)
+
+    with ThreadPoolExecutor(2) as pool:
+        futures = {page: pool.submit(run, page) for page in PAGES if page != FORGETS}
+    with ThreadPoolExecutor(1) as pool:
+        return futures | {FORGETS: pool.submit(run, FORGETS)}
+
+
+def _run_page(page: str, stage: Stage, database: str | None, folder: Path) -> list[shell.Done]:
+    found = [c for c in shell_commands() if c.page == page and why_not(c, UNRUN) is None]
+    told = _told(page, stage)
+    if database is not None:
+        told[DATABASE] = database
+    elif unrun := [command for command in found if DATABASE in command.text]:
+        warnings.warn(f"{page}: {len(unrun)} commands want a PostgreSQL server", stacklevel=1)
+        found = [command for command in found if command not in unrun]
+    variables = environment(folder, stage.url, "recordings" if page in PLAYS else SITE)
+    variables |= {"C": stage.constraint, "E": stage.export, "LINELOOM_TOKEN": "none-needed"}
+    return shell.run(found, told, folder, variables)
+
+
 @pytest.mark.parametrize("page", sorted({block.page for block in blocks("python")}))
 def test_the_python_of(
     page: str, stage: Stage, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
@@ -132,19 +164,10 @@ def test_the_python_of(
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_the_shell_commands_of(page: str, stage: Stage, folder: Path, database: str | None) -> None:
-    found = [c for c in shell_commands() if c.page == page and why_not(c, UNRUN) is None]
-    told = _told(page, stage)
-    if database is None:
-        found = [command for command in found if DATABASE not in command.text]
-    else:
-        told[DATABASE] = database
-    variables = environment(folder, stage.url, "recordings" if page in PLAYS else SITE)
-    variables |= {"C": stage.constraint, "E": stage.export, "LINELOOM_TOKEN": "none-needed"}
-    done = shell.run(found, told, folder, variables)
+def test_the_shell_commands_of(page: str, outcomes: dict[str, Future[list[shell.Done]]]) -> None:
     unlike = [
         f"`{one.command.text.strip()}` printed no {pattern}: {one.output[:1000]}"
-        for one in done
+        for one in outcomes[page].result()
         for start, pattern in EXPECTED
         if _begins(one.command, start) and not re.search(pattern, one.output)
     ]
