@@ -106,8 +106,9 @@ async (seconds) => {
 class LargeSite(FakeSite):
     """The fake site with a map as large as one likes, which can go on growing."""
 
-    def __init__(self, count: int) -> None:
+    def __init__(self, count: int, keyframes: int) -> None:
         super().__init__()
+        self._keyframes = keyframes
         self.tells_changes = True
         self._rng = np.random.default_rng(0)
         self._side = 1.2 * math.sqrt(count)
@@ -118,6 +119,21 @@ class LargeSite(FakeSite):
     def map(self) -> dict[str, Any]:
         """`GET …/map`."""
         return super().map() | {"lines": list(self._lines.values())}
+
+    def graph(self) -> dict[str, Any]:
+        """`GET …/graph`: one long way, aisle by aisle."""
+        found = super().graph()
+        aisle = max(round(self._side), 1)
+        nodes = [
+            found["nodes"][0]
+            | {"id": i, "seq": i, "stamp": 1000.0 + i, "x": float(i % aisle), "y": i // aisle * 1.0}
+            for i in range(self._keyframes)
+        ]
+        edges = [
+            {"source": i, "target": i + 1, "key": f"s{i}", "kind": "sequential"}
+            for i in range(self._keyframes - 1)
+        ]
+        return found | {"nodes": nodes, "edges": edges}
 
     def changes(self, since: int) -> dict[str, Any]:
         """`GET …/map?since=`."""
@@ -163,12 +179,13 @@ def main() -> int:
     """Print frames a second; exit code 1 where the viewer is not smooth."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--lines", type=int, default=100_000)
+    parser.add_argument("--keyframes", type=int, default=10_000)
     parser.add_argument("--seconds", type=float, default=4.0)
     options = parser.parse_args()
     path = shutil.which("chromium")
     if path is None:
         sys.exit("no Chromium: on Debian, apt-get install chromium")
-    site = LargeSite(options.lines)
+    site = LargeSite(options.lines, options.keyframes)
     with fake_server(site) as server, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=CHROMIUM_FLAGS)
         page = browser.new_page(viewport=DESKTOP)  # type: ignore[arg-type]
