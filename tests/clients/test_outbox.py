@@ -76,6 +76,10 @@ def test_put_numbers_and_flush_delivers_in_order(
     assert fake.batch_sizes == [10, 10, 5]
     assert fake.delivered() == [(outbox.session, n) for n in range(25)]
     outbox.close()
+    outbox.close()
+    assert (outbox.stats(), outbox.refusals()) == (stats, [])
+    with pytest.raises(OutboxError, match="is closed"):
+        outbox.put(scan(None))
 
 
 def test_every_start_is_a_session_unless_it_is_to_persist(

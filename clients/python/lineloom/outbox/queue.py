@@ -87,6 +87,7 @@ class ScanQueue:
         self._max_scans = max_scans
         self._on_full = on_full
         self._lock = threading.RLock()
+        self._last: tuple[OutboxStats, list[Refusal]] | None = None
         self._in_flight_to = 0
         try:
             self._db = sqlite3.connect(
@@ -100,8 +101,9 @@ class ScanQueue:
             raise OutboxError(f"{self.path} cannot be used as an outbox: {error}") from error
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file; what `stats` and `refusals` said last stays known."""
         with self._lock:
+            self._last = self.stats(), self.refusals()
             self._db.close()
 
     def fact(self, name: str, default: str) -> str:
@@ -112,7 +114,9 @@ class ScanQueue:
         return str(row[0])
 
     def next_seq(self, session: str) -> int:
-        """Return the seq after the last one put in the session."""
+        """Return the seq after the last one put in the session. Raises OutboxError once closed."""
+        if self._last is not None:
+            raise OutboxError(f"{self.path} is closed")
         with self._lock:
             row = self._db.execute(
                 "SELECT last_seq FROM sessions WHERE session = ?", (session,)
@@ -172,7 +176,9 @@ class ScanQueue:
             self._count("delivered", gone)
 
     def refusals(self) -> list[Refusal]:
-        """Return the latest refused scans, oldest first."""
+        """Return the latest refused scans, oldest first; once closed, as they were then."""
+        if self._last is not None:
+            return self._last[1]
         with self._lock:
             rows = self._db.execute(
                 "SELECT session, seq, reason FROM refused ORDER BY id"
@@ -180,7 +186,9 @@ class ScanQueue:
         return [Refusal(*row) for row in rows]
 
     def stats(self) -> OutboxStats:
-        """Return the counts."""
+        """Return the counts; once closed, as they were then."""
+        if self._last is not None:
+            return self._last[0]
         with self._lock:
             rows = self._db.execute("SELECT name, value FROM counters").fetchall()
         counts = dict.fromkeys(("put", "delivered", "refused", "dropped", "repeated"), 0)
