@@ -75,7 +75,11 @@ def _place_if_due(site: SiteMap, track: Track) -> Place | None:
         return None
     track.last_place_at = track.travelled[-1]
     members = recent_keyframes(track, config)
-    return site.add_place(tuple(members)) if len(members) >= config.least_keyframes else None
+    if len(members) < config.least_keyframes:
+        return None
+    place = site.add_place(tuple(members))
+    track.places.append(place.id)
+    return place
 
 
 def _tie_after(site: SiteMap, merge: ComponentMerged) -> None:

@@ -84,7 +84,8 @@ class DoubtConfig:
     may be from what a loop says. A place with at least `place_points` judged is right up to
     `place_right` missing, and wrong from `place_wrong` on; `wrong_in_a_row` of them after a right
     one mean that tracking slipped. slip [m]: how far aside a place may be found again before it is
-    another one.
+    another one. jump_missing: what may be missing between places two on along one track, over at
+    least jump_points points; real and simulated ones come to 7 % at most, jumps to 10 and more.
     """
 
     most_compared: int = 6
@@ -98,6 +99,8 @@ class DoubtConfig:
     place_wrong: float = 0.1
     wrong_in_a_row: int = 2
     slip: float = 1.5
+    jump_missing: float = 0.1
+    jump_points: int = 400
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,8 @@
 """Second thoughts: what a new place shows to be wrong about what was believed.
 
-Steps of `contradicted_by`: 1. hold the new place against those of other tracks that the map puts
-around it, and add up what is missing; 2. where a track was right and then is wrong, tracking has
+Steps of `contradicted_by`: 0. where the track's own places before are contradicted, the robot has
+jumped (`jumps`); 1. hold the new place against those of other tracks that the map puts around it,
+and add up what is missing; 2. where a track was right and then is wrong, tracking has
 slipped: name the step; 3. where too much of what stood still is missing between two tracks, the
 meeting that they rest on was false: name its whole set; 4. name loops that the solved graph does
 not bear out. What is named is withdrawn, and the history gone through without it.
@@ -15,6 +16,7 @@ import networkx as nx
 import numpy as np
 
 from lineloom_core.mapping.constraint import Constraint, step_id
+from lineloom_core.mapping.jumps import jump
 from lineloom_core.mapping.overlap import count_steady_nearby, usual_missing
 from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.places import Place, count_steady, missing_share
@@ -24,6 +26,9 @@ TrackPair = tuple[str, str]
 
 def contradicted_by(site: SiteMap, place: Place) -> tuple[Constraint, ...]:
     """Accepted constraints that are not to be believed any more, given the new place."""
+    jumped = jump(site, place)
+    if jumped is not None:
+        return (jumped,)
     counts = _compare(site, place)
     slipped = _slip(site, place, counts)
     if slipped is not None:

@@ -31,6 +31,8 @@ class Track:
     """Distance driven up to each keyframe [m]."""
     last_place_at: float = 0.0
     """Distance driven when the last place was made [m]."""
+    places: list[int] = field(default_factory=list)
+    """Ids of the places made of it, in their order."""
     right_until: int | None = None
     """The last place that agreed with other tracks' maps."""
     wrong_since: int = 0
