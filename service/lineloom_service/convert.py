@@ -107,24 +107,23 @@ def to_uncertain_pose(robot: RobotView) -> wire.UncertainPose | None:
 
 
 def to_trajectory(robot: str, view: SiteView) -> wire.Trajectory:
-    """Return every processed scan's pose."""
+    """Return every processed scan, with its pose if it has one."""
     found = view.trajectories.get(robot)
     poses: list[wire.TrajectoryPose] = []
     if found is not None:
-        rows = zip(
-            found.session,
-            found.seq.tolist(),
-            found.stamp.tolist(),
-            found.component,
-            found.poses.tolist(),
-            strict=True,
-        )
-        poses = [
-            wire.TrajectoryPose.model_construct(
-                session=session, seq=seq, stamp=stamp, component=component, x=x, y=y, theta=theta
+        for session, seq, stamp, component, pose in found.rows():
+            x, y, theta = (None, None, None) if pose is None else pose
+            poses.append(
+                wire.TrajectoryPose.model_construct(
+                    session=session,
+                    seq=seq,
+                    stamp=stamp,
+                    component=component,
+                    x=x,
+                    y=y,
+                    theta=theta,
+                )
             )
-            for session, seq, stamp, component, (x, y, theta) in rows
-        ]
     return wire.Trajectory.model_construct(robot=robot, version=view.version, poses=poses)
 
 

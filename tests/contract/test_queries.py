@@ -104,6 +104,20 @@ async def test_trajectory_as_tum_and_csv(client: httpx.AsyncClient) -> None:
     assert [record["seq"] for record in records] == ["0", "1", "2"]
 
 
+async def test_a_scan_that_fitted_nowhere_has_a_row_without_a_pose(
+    client: httpx.AsyncClient,
+) -> None:
+    path = "/robots/alone/trajectory"
+    placed, lost = (await _get(client, path)).json()["poses"]
+    assert placed["component"] is not None
+    nothing = dict.fromkeys(("component", "x", "y", "theta"))
+    assert lost == {"session": "0", "seq": 77, "stamp": 99.5, **nothing}
+    table = (await _get(client, path, format="csv")).text.splitlines()
+    assert table[2] == "0,77,99.5,,,,"
+    tum = (await _get(client, path, format="tum")).text.splitlines()
+    assert len([row for row in tum if not row.startswith("#")]) == 1
+
+
 async def test_transform(client: httpx.AsyncClient) -> None:
     answer = (await _get(client, "/transforms/a/b")).json()
     assert answer["T_a_b"] == {"x": 2.0, "y": 0.0, "theta": 0.0}

@@ -38,6 +38,7 @@ from lineloom_core.mapping.site_view import (
     SiteView,
     StateChange,
     TrajectoryView,
+    UnplacedScan,
 )
 from lineloom_core.scan import Mount, Scan
 
@@ -205,6 +206,7 @@ class FakeMapper:
             stamp=np.array([t for _, _, t in scans]),
             component=tuple(_component(robot) for _ in scans),
             poses=np.array([[i + 1.0, 0.0, 0.0] for i in range(len(scans))]),
+            unplaced=(UnplacedScan("0", 77, 99.5, 1),) if robot == "alone" else (),
         )
 
     def _lines(self, components: list[str]) -> list[MapLine]:

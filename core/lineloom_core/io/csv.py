@@ -16,19 +16,16 @@ COLUMNS = ("session", "seq", "stamp", "component", "x", "y", "theta")
 
 
 def write_trajectory(trajectory: TrajectoryView) -> str:
-    """Return a header and one row per pose, in processing order (s, m, rad; full precision)."""
+    """Return a header and one row per scan, in processing order (s, m, rad; full precision).
+
+    Component and pose of a scan that fitted nowhere are empty.
+    """
     target = io.StringIO()
     writer = csv.writer(target, lineterminator="\n")
     writer.writerow(COLUMNS)
-    for session, seq, stamp, component, (x, y, theta) in zip(
-        trajectory.session,
-        trajectory.seq.tolist(),
-        trajectory.stamp.tolist(),
-        trajectory.component,
-        trajectory.poses.tolist(),
-        strict=True,
-    ):
-        writer.writerow((session, seq, repr(stamp), component, repr(x), repr(y), repr(theta)))
+    for session, seq, stamp, component, pose in trajectory.rows():
+        figures = ("", "", "") if pose is None else map(repr, pose)
+        writer.writerow((session, seq, repr(stamp), component or "", *figures))
     return target.getvalue()
 
 

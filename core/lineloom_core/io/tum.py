@@ -12,7 +12,8 @@ def write_trajectory(trajectory: TrajectoryView) -> str:
 
     Stamps in seconds, positions in metres, the rotation about z as a unit quaternion; full
     precision. A comment line names component and session wherever they change: poses of different
-    components are in unrelated frames.
+    components are in unrelated frames. Scans that fitted nowhere have no row: the format knows none
+    without a pose.
     """
     rows = ["# timestamp tx ty tz qx qy qz qw"]
     before: tuple[str, str] | None = None

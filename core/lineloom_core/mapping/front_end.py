@@ -64,7 +64,7 @@ def take(
     record.session, record.seq, record.stamp = scan.session, scan.seq, scan.stamp
     tracked = _track(config, record, scan, features, cloud) if len(features.points) else None
     if tracked is None or tracked.pose is None:
-        taken = _unplaced(record)
+        taken = _unplaced(record, scan)
     else:
         taken = _place(config, history, record, scan, tracked, version)
     record.doctor.examine(raw, features, tracked.pose if tracked else None, record.track)
@@ -123,9 +123,9 @@ def _laser_odometry(record: RobotRecord, scan: Scan) -> Pose | None:
     return scan.odometry @ record.mount.T_base_laser
 
 
-def _unplaced(record: RobotRecord) -> Taken:
+def _unplaced(record: RobotRecord, scan: Scan) -> Taken:
     """The latest scan has no pose: say so, until one has."""
-    record.unplaced += 1
+    record.leave_unplaced(scan)
     if len(record.placed):
         record.state = "lost"
     return Taken(placed=False)
@@ -207,5 +207,5 @@ def _back_fill(
                 PlacedScan(scan.session, scan.seq, scan.stamp, anchor.id, found.pose)
             )
             return Taken(placed=True)
-    record.unplaced += 1
+    record.leave_unplaced(scan)
     return Taken(placed=False)

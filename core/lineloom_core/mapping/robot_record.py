@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 from lineloom_core.health import SensorDoctor
 from lineloom_core.mapping.placed_scans import PlacedScan, PlacedScans
-from lineloom_core.mapping.site_view import RobotState
+from lineloom_core.mapping.site_view import RobotState, UnplacedScan
 from lineloom_core.mapping.tracker import Tracker
-from lineloom_core.scan import Mount
+from lineloom_core.scan import Mount, Scan
 
 
 @dataclass
@@ -29,12 +29,16 @@ class RobotRecord:
     seq: int | None = None
     stamp: float | None = None
     processed: int = 0
-    unplaced: int = 0
+    unplaced: list[UnplacedScan] = field(default_factory=list)
     placed: PlacedScans = field(default_factory=PlacedScans)
     latest: PlacedScan | None = None
     doctor: SensorDoctor = field(default_factory=SensorDoctor)
     distrusted: str = ""
     """Why nothing of its session may be joined with other maps; empty where all is well."""
+
+    def leave_unplaced(self, scan: Scan) -> None:
+        """Remember a scan that fits nowhere."""
+        self.unplaced.append(UnplacedScan(scan.session, scan.seq, scan.stamp, len(self.placed)))
 
     def trust_again(self) -> None:
         """Begin anew: the lidar was mounted otherwise, or its driver restarted."""

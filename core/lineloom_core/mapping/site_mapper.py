@@ -39,7 +39,7 @@ from lineloom_core.mapping.view_builder import build_view
 from lineloom_core.mapping.what_if import what_if
 from lineloom_core.scan import Mount, Scan
 
-SNAPSHOT_FORMAT = 8
+SNAPSHOT_FORMAT = 9
 
 
 class SnapshotError(ValueError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -45,11 +46,21 @@ class ComponentView:
     keyframes: int
 
 
+@dataclass(frozen=True, slots=True)
+class UnplacedScan:
+    """A processed scan that fitted nowhere; after: number of placed ones processed before it."""
+
+    session: str
+    seq: int
+    stamp: float
+    after: int
+
+
 @dataclass(frozen=True)
 class TrajectoryView:
-    """Every processed and placed scan of a robot, in processing order; n rows.
+    """Every processed scan of a robot, in processing order; n rows of those that were placed.
 
-    poses: (n, 3) x, y, theta of the base in the map frame of `component[i]`.
+    poses: (n, 3) x, y, theta of the base in the map frame of `component[i]`. unplaced: the others.
     """
 
     session: tuple[str, ...]
@@ -57,6 +68,19 @@ class TrajectoryView:
     stamp: NDArray[np.float64]
     component: tuple[str, ...]
     poses: NDArray[np.float64]
+    unplaced: tuple[UnplacedScan, ...] = ()
+
+    def rows(self) -> Iterator[tuple[str, int, float, str | None, list[float] | None]]:
+        """Session, seq, stamp, component and pose of every scan; the last two None if unplaced."""
+        waiting = iter(self.unplaced)
+        lost = next(waiting, None)
+        seq, stamp, poses = self.seq.tolist(), self.stamp.tolist(), self.poses.tolist()
+        for i in range(len(seq) + 1):
+            while lost is not None and lost.after <= i:
+                yield lost.session, lost.seq, lost.stamp, None, None
+                lost = next(waiting, None)
+            if i < len(seq):
+                yield self.session[i], seq[i], stamp[i], self.component[i], poses[i]
 
 
 @dataclass(frozen=True)

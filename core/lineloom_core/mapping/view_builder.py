@@ -95,6 +95,7 @@ def _trajectory(site: SiteMap, record: RobotRecord, component_of: dict[int, str]
         stamp=placed.stamps,
         component=names_of(components, of),
         poses=_compose(in_map, np.broadcast_to(base, in_map.shape)),
+        unplaced=tuple(record.unplaced),
     )
 
 

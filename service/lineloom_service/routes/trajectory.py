@@ -48,6 +48,8 @@ async def get_trajectory(
 ) -> Response:
     """Return the pose of every processed scan: `format` is json, tum or csv.
 
+    A scan that fitted nowhere has a row without component and pose; tum leaves it out.
+
     In the floor plan's frame: of scans in components that have a place there.
     """
     view = (await in_frame(service, site, view, align=align, frame=frame)).view

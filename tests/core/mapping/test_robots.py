@@ -67,6 +67,8 @@ def test_a_late_scan_that_fits_nowhere_is_not_placed(drive: list[SimulatedScan])
     assert not mapper.add("r", covered(drive[10].scan)).placed
     after = mapper.view()
     assert len(after.trajectories["r"].seq) == len(before.trajectories["r"].seq)
+    lost = list(after.trajectories["r"].rows())[-1]
+    assert lost == ("0", 10, drive[10].scan.stamp, None, None)
     assert after.robots["r"].scans_processed == before.robots["r"].scans_processed + 1
 
 
@@ -113,6 +115,10 @@ def test_a_carried_robot_is_lost_and_starts_anew_without_a_link(
     assert [c.placed for c in changes[:4]] == [False, False, False, True]
     assert changes[3].started_component == "c1"
     view = mapper.view()
+    rows = list(view.trajectories["r"].rows())
+    assert [r[1] for r in rows] == [s.scan.seq for s in (*drive[:80], *after)]
+    assert [r[3:] for r in rows[80:83]] == [(None, None)] * 3
+    assert all(r[3] is not None and r[4] is not None for r in (*rows[:80], *rows[83:]))
     assert view.robots["r"].state == "tracking"
     component = {k.id: k.component for k in view.keyframes}
     assert all(component[c.keyframe_a] == component[c.keyframe_b] for c in view.constraints)

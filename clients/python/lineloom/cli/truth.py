@@ -46,9 +46,9 @@ class Truth:
     def _rows(self, client: Client, site: str, robot: str, component: str) -> list[tuple[Row, Row]]:
         known = self.poses[robot]
         return [
-            ((pose.x, pose.y, pose.theta), known[pose.seq])
-            for pose in client.trajectory(site, robot).poses
-            if pose.component == component and pose.seq in known
+            (pose, known[scan.seq])
+            for scan in client.trajectory(site, robot).poses
+            if scan.component == component and scan.seq in known and (pose := scan.pose)
         ]
 
     @staticmethod

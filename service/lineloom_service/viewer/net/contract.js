@@ -60,7 +60,7 @@
  * @typedef {{x1: number, y1: number, x2: number, y2: number, line: string|null}} PlanPiece
  * @typedef {{component: string, missing: PlanPiece[], new: PlanPiece[]}} PlanDifferencesAnswer
  *
- * @typedef {{seq: number, stamp: number, component: string, x: number, y: number,
- *   theta: number}} TrajectoryPose
+ * @typedef {{seq: number, stamp: number, component: string | null, x: number | null, y: number | null,
+ *   theta: number | null}} TrajectoryPose
  */
 export {};

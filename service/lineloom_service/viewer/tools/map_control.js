@@ -236,14 +236,23 @@ export class MapControl {
   }
 }
 
-/** Cut a trajectory where the component changes. @param {import("../net/contract.js").TrajectoryPose[]} poses */
+/**
+ * Cut a trajectory where the component changes or a scan fitted nowhere.
+ * @param {import("../net/contract.js").TrajectoryPose[]} poses
+ */
 function pieces(poses) {
   /** @type {{component: string, x: number, y: number}[][]} */
   const found = [];
-  for (const pose of poses) {
+  let open = false;
+  for (const { component, x, y } of poses) {
+    if (component === null || x === null || y === null) {
+      open = false;
+      continue;
+    }
     const last = found[found.length - 1];
-    if (last && last[0].component === pose.component) last.push(pose);
-    else found.push([pose]);
+    if (open && last[0].component === component) last.push({ component, x, y });
+    else found.push([{ component, x, y }]);
+    open = true;
   }
   return found;
 }
