@@ -6,6 +6,7 @@ import asyncio
 import logging
 
 import lineloom_core
+from lineloom_core.mapping.site_view import SiteView
 
 from lineloom_service.body_budget import BodyBudget
 from lineloom_service.engine.conductor import Conductor
@@ -81,6 +82,7 @@ class Service:
         self.store.subscribe(self._latency.on_commit)
         self.engine.subscribe(self._latency.on_view)
         await self.conductor.start()
+        self.engine.subscribe(self._on_view)
         self._warming = asyncio.create_task(self.matcher.warm_up())
         self._warming.add_done_callback(_report_failure)
 
@@ -92,6 +94,10 @@ class Service:
         await self.guard.stop()
         await self.conductor.stop()
         await self.store.close()
+
+    def _on_view(self, site_id: int, _position: int, _view: SiteView) -> None:
+        # Not this very view: one from before a restart is not shown.
+        self.maps.prepare(site_id, self.conductor.published(site_id).view)
 
     def _on_news(self, kind: NewsKind, key: str) -> None:
         if kind == "events":

@@ -16,7 +16,9 @@ from lineloom_service.convert import to_line
 from lineloom_service.engine.published import EMPTY_VIEW
 from lineloom_service.maps.line_history import LineHistory
 from lineloom_service.maps.map_json import write_line, write_map
+from lineloom_service.maps.map_store import MapStore
 from lineloom_service.maps.render_cache import RenderCache
+from lineloom_service.store.records import SiteRecord
 
 COMPONENTS = (ComponentView("c1", ("a", "b"), 4), ComponentView("c2", (), 1))
 BOX = (0.0, -1.0, 3.0, 1.0)
@@ -52,6 +54,42 @@ def _twin(view: SiteView, component: str | None, box: BBox | None) -> dict[str, 
 
 def _answer(history: LineHistory, view: SiteView, *asked: Any) -> wire.MapAnswer:
     return wire.MapAnswer.model_validate_json(write_map("s", view, history.at(view), *asked))
+
+
+class _Counted(MapStore):
+    """Counts what is rendered."""
+
+    def __init__(self) -> None:
+        super().__init__(10**6)
+        self.rendered: list[int] = []
+        get = self._cache.get
+
+        async def counted(key: Any, render: Any) -> bytes:
+            def render_once() -> str | bytes:
+                self.rendered.append(key[1])
+                return render()  # type: ignore[no-any-return]
+
+            return await get(key, render_once)
+
+        self._cache.get = counted  # type: ignore[method-assign]
+
+
+async def test_what_was_asked_for_is_rendered_beforehand_as_long_as_it_is() -> None:
+    first, second, third = _views(1, 4)
+    site = SiteRecord(1, "s", 0, 0, 0, {})
+    store = _Counted()
+    store.prepare(1, first)  # nobody has asked yet
+    await asyncio.sleep(0)
+    assert store.rendered == []
+    assert wire.MapAnswer.model_validate_json(await store.json(site, first)).version == 1
+    store.prepare(1, second)
+    async with asyncio.timeout(30.0):
+        while len(store.rendered) < 2:
+            await asyncio.sleep(0.001)
+    store.prepare(1, third)  # nobody has asked for the second
+    await asyncio.sleep(0.01)
+    assert wire.MapAnswer.model_validate_json(await store.json(site, second)).version == 2
+    assert store.rendered == [1, 2]
 
 
 CHOICES = [(None, None), ("c1", None), (None, BOX), ("c2", BOX)]

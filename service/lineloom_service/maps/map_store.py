@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 
 from lineloom_core.io.selection import BBox
@@ -19,6 +20,19 @@ class MapStore:
     def __init__(self, limit: int) -> None:
         self._cache = RenderCache(limit)
         self._histories: dict[int, LineHistory] = {}
+        self._asked: dict[int, SiteRecord] = {}
+        self._preparing: set[asyncio.Task[bytes]] = set()
+
+    def prepare(self, site_id: int, view: SiteView) -> None:
+        """Render a new view where somebody has asked for the one before; never waits.
+
+        Otherwise the first who asks pays for it, and under load that is one in a hundred.
+        """
+        site = self._asked.pop(site_id, None)
+        if site is not None:
+            task = asyncio.create_task(self._json(site, view))
+            self._preparing.add(task)
+            task.add_done_callback(self._preparing.discard)
 
     async def json(
         self,
@@ -29,6 +43,18 @@ class MapStore:
         since: int | None = None,
     ) -> bytes:
         """Return the map as JSON, or what changed in it after a version."""
+        if component is None and box is None and since is None:
+            self._asked[site.id] = site
+        return await self._json(site, view, component, box, since)
+
+    async def _json(
+        self,
+        site: SiteRecord,
+        view: SiteView,
+        component: str | None = None,
+        box: BBox | None = None,
+        since: int | None = None,
+    ) -> bytes:
         history = self._histories.setdefault(site.id, LineHistory(write_line))
 
         def render() -> bytes:
@@ -49,3 +75,4 @@ class MapStore:
     def forget_site(self, site_id: int) -> None:
         """A site was deleted."""
         self._histories.pop(site_id, None)
+        self._asked.pop(site_id, None)
