@@ -29,7 +29,7 @@ from lineloom_core.places import _kernels
 _CORNER_REACH = 0.15
 
 
-_BODIES_KEPT = 384
+_BODIES_KEPT = 768
 """Places whose arrays stay in memory, about 0.15 MB each; another one's are made in 1 ms."""
 
 
