@@ -52,6 +52,7 @@ class TrackerConfig:
     new room shows mostly new walls. enough_fit: below it the scan becomes a keyframe, since so
     much of it is new. most_conflict: share of it that may lie where the keyframe saw free space;
     of nearly 90,000 steps of simulated robots among people, none of the right ones had as much.
+    noisy_conflict: the same for a robot whose lidar is noisy: what it sees contradicts itself.
     patience: unfit scans in a row before the track is given up. longest_gap: silence after which
     the last step's velocity means nothing, and a scan must fit by gap_fit and conflict by at most
     gap_conflict. longest_silence: after which a robot may have been carried anywhere.
@@ -68,6 +69,7 @@ class TrackerConfig:
     least_fit: float = 0.2
     enough_fit: float = 0.6
     most_conflict: float = 0.2
+    noisy_conflict: float = 0.3
     patience: int = 4
     longest_gap: float = 0.6
     gap_fit: float = 0.5
@@ -175,7 +177,12 @@ class Tracker:
         config = self._config
         if elapsed > config.longest_gap:
             return found.fit < config.gap_fit or conflict > config.gap_conflict
-        return found.fit < config.least_fit or conflict > config.most_conflict
+        most = config.noisy_conflict if self._is_noisy else config.most_conflict
+        return found.fit < config.least_fit or conflict > most
+
+    @property
+    def _is_noisy(self) -> bool:
+        return self._noise.value > self._config.noisy_above
 
     def _usual_twist(self) -> NDArray[np.float64]:
         """Velocity over the last second, zero where it is not known."""
@@ -274,8 +281,7 @@ class Tracker:
     def _add_keyframe(self, features: ScanFeatures, cloud: Cloud) -> None:
         """More keyframes in the local map where a noisy lidar makes each worth less."""
         config = self._config
-        noisy = self._noise.value > config.noisy_above
-        depth = config.noisy_memory if noisy else config.memory
+        depth = config.noisy_memory if self._is_noisy else config.memory
         self._recent.add(features, cloud, self._pose, depth=depth)
 
 
