@@ -65,7 +65,7 @@ class JoinConfig:
     lead: float = 2.0
     least_distinctive: int = 2
     distinctive: float = 1.3
-    most_missing: float = 0.025
+    most_missing: float = 0.018
     most_map_missing: float = 0.03
     most_doubt: float = 0.045
     doubted_points: float = 180.0

@@ -3,9 +3,9 @@
 Walls repeat; what stands between them does not. Two views of one room agree in nearly everything
 that stood still while the robots passed (people walk, a door may have moved). Two rooms that look
 alike differ in some furniture, and over a whole meeting that adds up: in simulated hotels, offices
-and corridors of equal bays, true meetings miss at most 2.5 % of the steady points, false ones
-5 to 9 %. A robot whose lidar is noisy misses some of that in its own map, a few metres on, where it
-knows its way well: so much more may it miss in another robot's.
+and corridors of equal bays, true meetings miss at most 0.8 % of the steady points, in real
+buildings 1.4 %; false ones 2.4 to 9 %. A robot whose lidar is noisy misses some of that in its own
+map, a few metres on, where it knows its way well: so much more may it miss in another robot's.
 """
 
 from __future__ import annotations
