@@ -9,20 +9,20 @@ MB = 1_000_000
 
 
 def _moments(*api: int) -> list[Moment]:
-    maps = (0, 10_000, 15_000)
+    maps = (0, 10_000, 10_500)
     return [
         Moment(when, size, 0, {"API": rss * MB})
         for when, size, rss in zip(("start", "middle", "end"), maps, api, strict=True)
     ]
 
 
-def test_memory_may_grow_as_the_map_does() -> None:
+def test_memory_may_grow_while_the_building_is_got_to_know() -> None:
     (row,) = _rows(_moments(100, 120, 130), "")
-    assert (row.figure, row.goal, row.reached) == (2.0, 2.0, True)
+    assert (row.figure, row.goal, row.reached) == (10.0, 10.0, True)
 
 
-def test_memory_that_grows_while_the_map_hardly_does_misses_the_goal() -> None:
-    (row,) = _rows(_moments(100, 120, 140), "")
+def test_memory_that_goes_on_growing_misses_the_goal() -> None:
+    (row,) = _rows(_moments(100, 120, 131), "")
     assert row.reached is False
 
 
