@@ -59,8 +59,7 @@ def test_a_mapped_office_is_served_in_its_floor_plans_coordinates(tmp_path: Path
             rows = [p["seq"] for p in poses]
             assert np.hypot(*(placed - driven[rows, :2]).T).max() < 0.25
             found = client.floorplan_differences("office")
-            missing = sum(math.hypot(p.x2 - p.x1, p.y2 - p.y1) for p in found.missing)
-            assert missing < 0.03 * found.confirmed_m  # short pieces beside doors
+            assert sum(math.hypot(p.x2 - p.x1, p.y2 - p.y1) for p in found.missing) < 3.0
             assert b"pieces of wall" in client.floorplan_drawing("office")
         service.stop()
         service.start()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lineloom_core.floorplan.fit import CONFIRMED, MISSING, Judge
+from lineloom_core.floorplan.fit import CONFIRMED, MISSING, UNSEEN, Judge
 from lineloom_core.floorplan.plan import lengths
 from lineloom_core.floorplan.samples import Samples
 from lineloom_core.geometry import Pose
@@ -20,9 +20,9 @@ _LEAST_PIECE_M = 0.4
 class Differences:
     """All in the plan's frame, rows x1, y1, x2, y2 [m].
 
-    missing: walls of the plan in whose place free space was seen. new: mapped walls that the plan
-    does not have; new_of (k,): the index of the map's line that each is a piece of. confirmed,
-    unseen: walls of the plan that are there, and those that nobody has seen.
+    missing: walls of the plan in whose place free space was seen, and on both of their sides. new:
+    mapped walls that the plan does not have; new_of (k,): the index of the map's line that each is
+    a piece of. confirmed, unseen: walls of the plan that are there, and those that nobody has seen.
     """
 
     missing: NDArray[np.float64]
@@ -38,6 +38,7 @@ def differences(judge: Judge, T_plan_map: Pose) -> Differences:
     Missing and new walls shorter than 0.4 m are left out.
     """
     states = judge.states(T_plan_map)
+    states[(states == MISSING) & ~judge.seen_through(T_plan_map)] = UNSEEN
     missing, _ = _pieces(judge.plan, states == MISSING)
     confirmed, _ = _pieces(judge.plan, states == CONFIRMED)
     unseen, _ = _pieces(judge.plan, (states != MISSING) & (states != CONFIRMED))

@@ -115,16 +115,33 @@ class Judge:
 
     def states(self, T_plan_map: Pose) -> NDArray[np.int8]:
         """Tell of each of the plan's samples whether it is CONFIRMED, MISSING or UNSEEN."""
-        grid = self.grid
-        at = T_plan_map.inverse().transform(self.plan.points)
-        cells = np.floor((at - [grid.x, grid.y]) / grid.resolution).astype(np.int64)
-        rows, columns = grid.cells.shape
-        j, i = cells[:, 0], cells[:, 1]
-        inside = (i >= 0) & (i < rows) & (j >= 0) & (j < columns)
-        i, j = np.where(inside, i, 0), np.where(inside, j, 0)
+        i, j, inside = self._cells_at(T_plan_map.inverse().transform(self.plan.points))
         near = inside & (self._from_walls[i, j] <= TOLERANCE_M)
-        free = inside & (grid.cells[i, j] == FREE) & ~near
+        free = inside & (self.grid.cells[i, j] == FREE) & ~near
         return np.where(near, CONFIRMED, np.where(free, MISSING, UNSEEN)).astype(np.int8)
+
+    def seen_through(self, T_plan_map: Pose) -> NDArray[np.bool_]:
+        """Tell of each of the plan's samples whether free space was seen on both of its sides.
+
+        Beams that only graze a wall pass through its cells too, and say nothing of what is behind.
+        """
+        T, direction = T_plan_map.inverse(), self.plan.direction
+        aside = TOLERANCE_M * np.column_stack([-np.sin(direction), np.cos(direction)])
+        through = np.ones(len(direction), dtype=np.bool_)
+        for shift in (aside, -aside):
+            i, j, inside = self._cells_at(T.transform(self.plan.points + shift))
+            through &= inside & (self.grid.cells[i, j] == FREE)
+        return through
+
+    def _cells_at(
+        self, points: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+        """Row and column of the grid's cell at each point of the map, and whether there is one."""
+        cells = np.floor((points - [self.grid.x, self.grid.y]) / self.grid.resolution)
+        j, i = cells.astype(np.int64).T
+        rows, columns = self.grid.cells.shape
+        inside = (i >= 0) & (i < rows) & (j >= 0) & (j < columns)
+        return np.where(inside, i, 0), np.where(inside, j, 0), inside
 
     @cached_property
     def _from_walls(self) -> NDArray[np.float64]:
