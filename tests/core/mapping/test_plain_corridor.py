@@ -56,5 +56,7 @@ def test_wheels_know_the_way_along(lidar: Lidar) -> None:
 @LIDARS
 def test_the_step_claims_no_knowledge_along(lidar: Lidar) -> None:
     last = follow(lidar, [Pose(0.06 * k, 0.0, 0.0) for k in range(20)], odometry=True)[-1]
-    along, across = last.information[0, 0], last.information[1, 1]
-    assert along < 1e-5 * across
+    (least, most), axes = np.linalg.eigh(last.information[:2, :2])
+    assert least < 1e-12 * most
+    # Along the walls as this scan sees them: its noise turns them by a tenth of a degree.
+    assert abs(axes[1, 0]) < 0.003
