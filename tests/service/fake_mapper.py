@@ -40,6 +40,7 @@ from lineloom_core.mapping.site_view import (
     TrajectoryView,
     UnplacedScan,
 )
+from lineloom_core.mapping.snapshot import Snapshot
 from lineloom_core.scan import Mount, Scan
 
 RAISES, CRASHES, RAISES_ONCE, HANGS = 666.0, 667.0, 668.0, 669.0
@@ -166,15 +167,15 @@ class FakeMapper:
             constraints=tuple(self._constraints(keyframes)),
         )
 
-    def snapshot(self) -> bytes:
+    def snapshot(self, known: int = 0) -> Snapshot:
         if self._latest == UNSAVED:
             raise ValueError("this cannot be pickled")
-        return pickle.dumps(self.__dict__)
+        return Snapshot(pickle.dumps(self.__dict__), known)
 
     @classmethod
-    def restore(cls, data: bytes) -> FakeMapper:
+    def restore(cls, snapshot: Snapshot) -> FakeMapper:
         mapper = cls()
-        mapper.__dict__.update(pickle.loads(data))
+        mapper.__dict__.update(pickle.loads(snapshot.state))
         return mapper
 
     def _link(self, *parts: str | bytes) -> None:

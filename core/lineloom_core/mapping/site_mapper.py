@@ -34,16 +34,13 @@ from lineloom_core.mapping.rebuild import first_affected, rebuild
 from lineloom_core.mapping.robot_record import RobotRecord
 from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.snapshot import Snapshot, SnapshotError
 from lineloom_core.mapping.verdicts import Verdicts
 from lineloom_core.mapping.view_builder import build_view
 from lineloom_core.mapping.what_if import what_if
 from lineloom_core.scan import Mount, Scan
 
 SNAPSHOT_FORMAT = 9
-
-
-class SnapshotError(ValueError):
-    """A snapshot that this version cannot read: rebuild from the log instead."""
 
 
 class SiteMapper:
@@ -171,8 +168,8 @@ class SiteMapper:
         """Everything there is to know at this version; changes nothing."""
         return build_view(self._site, self._robots, self._version)
 
-    def snapshot(self) -> bytes:
-        """The whole state as bytes, for `restore`."""
+    def snapshot(self, known: int = 0) -> Snapshot:
+        """The whole state, for `restore`, without the first `known` chapters of the history."""
         state = (
             SNAPSHOT_FORMAT,
             self._config,
@@ -182,13 +179,13 @@ class SiteMapper:
             self._robots,
             self._version,
         )
-        return pickle.dumps(state, protocol=5)
+        return Snapshot(pickle.dumps(state, protocol=5), known)
 
     @classmethod
-    def restore(cls, data: bytes) -> SiteMapper:
-        """Go on from a snapshot. Raises SnapshotError where it cannot be read."""
+    def restore(cls, snapshot: Snapshot) -> SiteMapper:
+        """Go on from a whole snapshot. Raises SnapshotError where it cannot be read."""
         try:
-            form, config, memory, history, site, robots, version = pickle.loads(data)
+            form, config, memory, history, site, robots, version = pickle.loads(snapshot.state)
         except Exception as error:
             raise SnapshotError(f"unreadable snapshot: {error}") from error
         if form != SNAPSHOT_FORMAT:

@@ -19,7 +19,7 @@ from lineloom_service.engine.messages import (
     Feed,
     Ready,
     Report,
-    Snapshot,
+    SnapshotTaken,
     Started,
     StartSite,
     StopSite,
@@ -276,14 +276,14 @@ class LocalEngine:
         asyncio.get_running_loop().call_later(pause, self._spawn, slot)
 
 
-def _resolve(answer: asyncio.Future[Any], report: Fed | Started | Snapshot | Answered) -> None:
+def _resolve(answer: asyncio.Future[Any], report: Fed | Started | SnapshotTaken | Answered) -> None:
     if answer.done():
         return
     if isinstance(report, Answered) and report.failure is not None:
         answer.set_exception(QuestionFailedError(report.failure))
     elif isinstance(report, Answered):
         answer.set_result(report.value)
-    elif isinstance(report, Snapshot) and report.failure is not None:
+    elif isinstance(report, SnapshotTaken) and report.failure is not None:
         answer.set_exception(SnapshotFailedError(report.failure))
     else:
-        answer.set_result(report.data if isinstance(report, Snapshot) else b"")
+        answer.set_result(report.data if isinstance(report, SnapshotTaken) else b"")

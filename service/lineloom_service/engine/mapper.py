@@ -7,6 +7,7 @@ from typing import Any, Protocol
 
 from lineloom_core.mapping.changes import Changes
 from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.snapshot import Snapshot
 from lineloom_core.scan import Mount, Scan
 
 from lineloom_service.store.codec import decode_mount, decode_scan
@@ -49,8 +50,8 @@ class Mapper(Protocol):
         """Return all that is known now."""
         ...
 
-    def snapshot(self) -> bytes:
-        """Return the state."""
+    def snapshot(self, known: int = 0) -> Snapshot:
+        """Return the state, without the first `known` chapters of its history."""
         ...
 
 
@@ -61,8 +62,8 @@ class MapperFactory(Protocol):
         """Make a mapper that knows nothing."""
         ...
 
-    def restore(self, data: bytes) -> Mapper:
-        """Make one from a snapshot."""
+    def restore(self, snapshot: Snapshot) -> Mapper:
+        """Make one from a whole snapshot."""
         ...
 
 

@@ -125,7 +125,7 @@ class Stopped:
 
 
 @dataclass(frozen=True, slots=True)
-class Snapshot:
+class SnapshotTaken:
     """The state after all that was fed. failure: why there is none."""
 
     site: int
@@ -161,6 +161,6 @@ class Timed:
     durations: Durations
 
 
-Report = Timed | Ready | Started | Fed | View | ViewFailed | Snapshot | Answered | Failed
+Report = Timed | Ready | Started | Fed | View | ViewFailed | SnapshotTaken | Answered | Failed
 Sent = Report | EncodedView | Stopped
 """What a worker sends; `WorkerProcess` makes reports of it."""

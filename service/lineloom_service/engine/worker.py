@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 
 from lineloom_core import timing
+from lineloom_core.mapping.snapshot import Snapshot
 
 from lineloom_service.engine.current_entry import BUSY, RESTORING, CurrentEntry
 from lineloom_service.engine.mapper import QUESTIONS, Mapper, MapperFactory, apply, load
@@ -26,7 +27,7 @@ from lineloom_service.engine.messages import (
     Order,
     Ready,
     Sent,
-    Snapshot,
+    SnapshotTaken,
     Started,
     StartSite,
     Stopped,
@@ -138,7 +139,7 @@ class Worker:
             if order.snapshot is None:
                 mapper = self._factory()
             else:
-                mapper = self._factory.restore(zlib.decompress(order.snapshot))
+                mapper = self._factory.restore(Snapshot(zlib.decompress(order.snapshot)))
         except Exception as error:
             self._connection.send(Started(order.site, order.run, describe(error)))
             return
@@ -191,16 +192,16 @@ class Worker:
         try:
             # Four times smaller at the quickest level.
             begin = time.perf_counter()
-            data = zlib.compress(hosted.mapper.snapshot(), 1)
+            data = zlib.compress(hosted.mapper.snapshot().state, 1)
             self._durations.observe("snapshot", time.perf_counter() - begin)
         except Exception as error:
             # The map is as it was, and no entry is to blame: the site goes on without.
             _LOG.exception("site %d: no snapshot", order.site)
-            self._connection.send(Snapshot(order.site, order.run, failure=describe(error)))
+            self._connection.send(SnapshotTaken(order.site, order.run, failure=describe(error)))
             return
         finally:
             self._current.clear()
-        self._connection.send(Snapshot(order.site, order.run, data))
+        self._connection.send(SnapshotTaken(order.site, order.run, data))
 
     def _answer(self, order: Ask) -> None:
         hosted = self._hosted(order)

@@ -15,6 +15,7 @@ from lineloom_core.mapping.resting import Resting
 from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.mapping.site_mapper import SiteMapper
 from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.snapshot import Snapshot
 from lineloom_core.mapping.thinning import thin
 from lineloom_core.mapping.track import Track
 from lineloom_core.simulation import SimulatedScan, World
@@ -165,12 +166,12 @@ class Kept:
     mapper: SiteMapper
     shown: list[int]
     made: list[int]
-    half: bytes
+    half: Snapshot
 
 
 @pytest.fixture(scope="module")
 def kept(long_drive: list[SimulatedScan]) -> Kept:
-    mapper, shown, made, half = SiteMapper(TIGHT), list[int](), [0], b""
+    mapper, shown, made, half = SiteMapper(TIGHT), list[int](), [0], Snapshot(b"")
     for number, part in enumerate(np.array_split(np.arange(len(long_drive)), 8), start=1):
         changes = feed(mapper, (long_drive[i] for i in part))
         shown.append(len(mapper.view().keyframes))

@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 from lineloom_core.mapping.site_mapper import SiteMapper
 from lineloom_core.mapping.site_view import ConstraintView, SiteView
+from lineloom_core.mapping.snapshot import Snapshot
 from lineloom_core.simulation import Fleet, SimulatedScan, rooms, sick_lms200
 
 from tests.core.mapping.drives import component_error, feed, fingerprint, mapped
@@ -21,12 +22,12 @@ def log() -> list[SimulatedScan]:
 
 
 @pytest.fixture(scope="module")
-def snapshot(log: list[SimulatedScan]) -> bytes:
+def snapshot(log: list[SimulatedScan]) -> Snapshot:
     return mapped(log).snapshot()
 
 
 @pytest.fixture
-def mapper(snapshot: bytes) -> SiteMapper:
+def mapper(snapshot: Snapshot) -> SiteMapper:
     return SiteMapper.restore(snapshot)
 
 
@@ -105,7 +106,7 @@ def test_restoring_gives_the_map_back_bit_for_bit(mapper: SiteMapper) -> None:
     assert fingerprint(replace(mapper.view(), version=0)) == fingerprint(replace(before, version=0))
 
 
-def test_order_of_retractions_does_not_matter(snapshot: bytes) -> None:
+def test_order_of_retractions_does_not_matter(snapshot: Snapshot) -> None:
     mappers = [SiteMapper.restore(snapshot) for _ in range(2)]
     view = mappers[0].view()
     names = [accepted(view, "loop")[0].id, recognised(view).id]
