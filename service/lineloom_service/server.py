@@ -17,6 +17,7 @@ from typing import NoReturn
 import uvicorn
 import uvloop
 
+from lineloom_service.allocator import give_back
 from lineloom_service.app import create_app
 from lineloom_service.observation import log
 from lineloom_service.security.guard import UnprotectedError
@@ -39,6 +40,7 @@ _FULL_COLLECTION_EVERY = 100
 def run(settings: Settings) -> None:
     """Serve until SIGINT or SIGTERM. Exits with a message where it cannot even start."""
     log.configure(settings.log_level, settings.log_format)
+    give_back()
     try:
         run_service(Service(settings))
     except (StoreError, UnprotectedError) as error:
