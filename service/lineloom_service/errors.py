@@ -11,6 +11,7 @@ from fastapi.exceptions import RequestValidationError
 from lineloom.wire import FieldError, Problem
 from pydantic import ValidationError
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 
 from lineloom_service.store.records import BacklogFullError, StoreError
 
@@ -39,6 +40,7 @@ UNKNOWN_CONSTRAINT = Kind("unknown-constraint", 404, "There is no such constrain
 UNKNOWN_EXPORT = Kind("unknown-export", 404, "There is no such export")
 NO_FLOOR_PLAN = Kind("no-floor-plan", 404, "The site has no floor plan")
 METHOD_NOT_ALLOWED = Kind("method-not-allowed", 405, "This method is not for this address")
+SLOW_BODY = Kind("slow-body", 408, "The body came too slowly")
 NOT_CONNECTED = Kind("not-connected", 409, "The two robots' poses are not related")
 NOT_REGISTERED = Kind("not-registered", 409, "The map has no place in the floor plan")
 TOO_LARGE = Kind("too-large", 413, "The body is too large")
@@ -154,6 +156,11 @@ def install(app: FastAPI, allowed_methods: Callable[[str], Sequence[str]]) -> No
         return _counted(
             request, _OTHER, str(error.detail), status=error.status_code, headers=error.headers
         )
+
+    @app.exception_handler(ClientDisconnect)
+    async def _gone(request: Request, _: ClientDisconnect) -> Response:
+        # For the figures and the log: nobody is there to read it.
+        return _counted(request, MALFORMED_BODY, "the connection ended in the middle of the body")
 
     @app.exception_handler(BacklogFullError)
     async def _backlog(request: Request, error: BacklogFullError) -> Response:

@@ -12,6 +12,7 @@ from lineloom.wire import JSON, MSGPACK
 from pydantic_core import from_json
 
 from lineloom_service.body_budget import lease_of
+from lineloom_service.body_pace import paced
 from lineloom_service.errors import (
     MALFORMED_BODY,
     TOO_LARGE,
@@ -19,6 +20,7 @@ from lineloom_service.errors import (
     UNSUPPORTED_TYPE,
     ProblemError,
 )
+from lineloom_service.settings import Settings
 
 _MOST_MEMBERS = 64
 """Each costs a copy of what follows it."""
@@ -37,24 +39,21 @@ class Body:
     is_json: bool
 
 
-async def read_body(request: Request, limit: int) -> Body:
-    """Return the body of a request of at most `limit` bytes, compressed as well as plain.
+async def read_body(request: Request, settings: Settings) -> Body:
+    """Return the body of a request, within the limits of its size, also plain, and its pace.
 
-    Raises ProblemError: 415 before anything is read, 413 as soon as it is known, 400.
+    Raises ProblemError: 415 before anything is read, 413 as soon as it is known, 408, 400.
     """
     is_json = _is_json(request)
-    is_gzip = _is_gzip(request)
-    data = await _read(request, limit)
-    if is_gzip:
-        data = _gunzip(data, limit)
-        lease_of(request.scope).take(len(data))
+    data = await read_raw(request, settings)
     return Body(_decode_json(data) if is_json else _decode_msgpack(data), is_json)
 
 
-async def read_raw(request: Request, limit: int) -> bytes:
+async def read_raw(request: Request, settings: Settings) -> bytes:
     """Return a body of another kind as it is, but decompressed. Raises as `read_body` does."""
+    limit = settings.max_body_bytes
     is_gzip = _is_gzip(request)
-    data = await _read(request, limit)
+    data = await _read(request, settings)
     if is_gzip:
         data = _gunzip(data, limit)
         lease_of(request.scope).take(len(data))
@@ -83,13 +82,15 @@ def _is_gzip(request: Request) -> bool:
     return encoding == "gzip"
 
 
-async def _read(request: Request, limit: int) -> bytes:
+async def _read(request: Request, settings: Settings) -> bytes:
+    limit = settings.max_body_bytes
     declared = request.headers.get("content-length", "")
     if declared.isdigit() and int(declared) > limit:
         raise _too_large(limit)
     parts: list[bytes] = []
     size = 0
-    async for part in request.stream():
+    pace = settings.slow_sender_s, settings.min_body_rate
+    async for part in paced(request.stream(), *pace):
         size += len(part)
         if size > limit:
             raise _too_large(limit)

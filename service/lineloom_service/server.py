@@ -19,6 +19,7 @@ import uvloop
 
 from lineloom_service.allocator import give_back
 from lineloom_service.app import create_app
+from lineloom_service.head_limit import HeadLimitApp, head_limited
 from lineloom_service.observation import log
 from lineloom_service.security.guard import UnprotectedError
 from lineloom_service.service import Service
@@ -79,10 +80,12 @@ async def serve(service: Service) -> None:
     settings = service.settings
     try:
         config = uvicorn.Config(
-            create_app(service=service),
+            HeadLimitApp(create_app(service=service)),
             host=settings.host,
             port=settings.port,
             log_config=None,
+            http=head_limited(settings.slow_sender_s),
+            ws="none",
             proxy_headers=False,
             access_log=False,
             timeout_graceful_shutdown=_SHUTDOWN_S,

@@ -104,6 +104,15 @@ class Settings(BaseSettings):
     slow_reader_s: float = Field(
         default=20.0, gt=0.0, description="A client that reads nothing for this long is dropped."
     )
+    slow_sender_s: float = Field(
+        default=20.0,
+        gt=0.0,
+        description="A client is dropped whose request has no complete head after this long, or "
+        "whose body is this far behind `min_body_rate`.",
+    )
+    min_body_rate: float = Field(
+        default=1000.0, gt=0.0, description="Bytes a second at which a body has to come."
+    )
 
     @field_validator("allow_origins", mode="before")
     @classmethod

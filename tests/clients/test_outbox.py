@@ -219,6 +219,18 @@ def test_one_poisoned_scan_does_not_hold_up_the_others(
     assert [(entry.session, entry.seq) for entry in outbox.refusals()] == [("poison", 5)]
 
 
+def test_a_link_that_was_too_slow_costs_no_scan(
+    path: Path, client: Client, fake: FakeService, quick: RetryPolicy
+) -> None:
+    outbox = make(path, client, quick, batch=8)
+    for seq in range(8):
+        outbox.put(scan(seq))
+    fake.failures = [problem(408, "slow-body", "the body came too slowly")] * 40
+    stats = outbox.flush(5.0)
+    assert (stats.delivered, stats.refused, stats.pending) == (8, 0, 0)
+    assert not fake.failures
+
+
 def test_the_background_delivers_by_itself(
     path: Path, client: Client, fake: FakeService, quick: RetryPolicy
 ) -> None:

@@ -30,7 +30,7 @@ def test_the_last_attempt_is_the_last() -> None:
     assert policy.after_failure(2) is None
 
 
-@pytest.mark.parametrize("status", [429, 502, 503, 504])
+@pytest.mark.parametrize("status", [408, 429, 502, 503, 504])
 def test_passing_troubles_are_tried_again(status: int) -> None:
     assert RetryPolicy().after_status(0, status, None) is not None
 

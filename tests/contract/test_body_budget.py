@@ -98,6 +98,17 @@ async def test_what_a_body_is_decompressed_to_counts(
     assert service.bodies.taken == 0  # who goes away holds nothing
 
 
+async def test_a_body_that_stops_gives_its_share_back(tmp_path: Path) -> None:
+    service = Service(Settings(data_dir=tmp_path, slow_sender_s=0.05))
+    transport = httpx.ASGITransport(create_app(service=service))
+    async with httpx.AsyncClient(transport=transport, base_url="http://lineloom") as client:
+        answer = await client.post(URL, content=aiter(_Slow()), headers=JSON)
+    assert answer.status_code == 408
+    assert answer.json()["type"] == "/problems/slow-body"
+    assert answer.headers["connection"] == "close"
+    assert service.bodies.taken == 0
+
+
 def test_the_limit_has_room_for_one_body() -> None:
     with pytest.raises(ValueError, match="max_bodies_bytes must hold"):
         Settings(max_body_bytes=4096, max_bodies_bytes=8000)

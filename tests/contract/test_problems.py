@@ -80,6 +80,7 @@ async def test_types_are_stable() -> None:
         "not-found",
         "not-ready",
         "not-registered",
+        "slow-body",
         "storage",
         "too-large",
         "too-many-streams",

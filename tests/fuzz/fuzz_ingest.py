@@ -24,9 +24,10 @@ with atheris.instrument_imports(include=["lineloom", "lineloom_service", "linelo
     from lineloom_service.errors import ProblemError
     from lineloom_service.intake import take_in
     from lineloom_service.request_body import read_body
+    from lineloom_service.settings import Settings
     from starlette.requests import Request
 
-_LIMIT = 1 << 20
+_SETTINGS = Settings(max_body_bytes=1 << 20)
 _BUDGET = BodyBudget(1 << 62)
 _TYPES = (b"application/json", b"application/msgpack")
 _REFUSED = {400, 413, 415, 422}
@@ -53,7 +54,7 @@ def try_one(data: bytes) -> None:
 
 
 async def _take(request: Request) -> None:
-    intake = await take_in(await read_body(request, _LIMIT), 1000)
+    intake = await take_in(await read_body(request, _SETTINGS), 1000)
     assert intake.scans
     assert all(rejected.reason for rejected in intake.rejected)
 

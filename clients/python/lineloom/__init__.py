@@ -27,6 +27,7 @@ from lineloom.errors import (
     ProblemError,
     SequenceError,
     ServiceFailedError,
+    TooSlowError,
     UnexpectedAnswerError,
 )
 from lineloom.outbox import Outbox, OutboxStats
@@ -52,5 +53,6 @@ __all__ = [
     "RetryPolicy",
     "SequenceError",
     "ServiceFailedError",
+    "TooSlowError",
     "UnexpectedAnswerError",
 ]

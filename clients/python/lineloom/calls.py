@@ -70,7 +70,7 @@ class MapOptions:
 
 @dataclass(frozen=True)
 class Call(Generic[_T]):
-    """One request, and how to read its answer. retried: whether a 5xx or 429 is tried again."""
+    """One request, and how to read its answer. retried: whether 5xx, 408, 429 are tried again."""
 
     method: str
     path: str

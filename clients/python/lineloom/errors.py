@@ -8,6 +8,7 @@ LineloomError
 │   ├── NotFoundError           404
 │   ├── ConflictError           409, e.g. two robots that are not connected yet
 │   ├── BusyError               429: the site's backlog is full; has retry_after
+│   ├── TooSlowError            408: the request did not come through in time
 │   └── ServiceFailedError      5xx
 ├── UnexpectedAnswerError       an answer that is not of the contract: is it Lineloom at all?
 ├── InvalidScanError            a scan that cannot be sent (also a ValueError)
@@ -72,6 +73,10 @@ class BusyError(ProblemError):
     """The site's backlog is over its limit; nothing was taken. See `retry_after` [s]."""
 
 
+class TooSlowError(ProblemError):
+    """The request came too slowly and nothing of it was taken: the link, not what was sent."""
+
+
 class ServiceFailedError(ProblemError):
     """The service, or a proxy before it, failed."""
 
@@ -115,6 +120,7 @@ def problem_error(problem: Problem, retry_after: float | None = None) -> Problem
         HTTPStatus.UNAUTHORIZED: AccessDeniedError,
         HTTPStatus.FORBIDDEN: AccessDeniedError,
         HTTPStatus.NOT_FOUND: NotFoundError,
+        HTTPStatus.REQUEST_TIMEOUT: TooSlowError,
         HTTPStatus.CONFLICT: ConflictError,
         HTTPStatus.TOO_MANY_REQUESTS: BusyError,
     }

@@ -107,7 +107,7 @@ async def delete_export(site: KnownSite, export: str, service: ServiceDep) -> Re
 
 
 async def _read_request(request: Request, service: Service) -> wire.ExportRequest:
-    body = await read_body(request, service.settings.max_body_bytes)
+    body = await read_body(request, service.settings)
     try:
         return wire.ExportRequest.model_validate(body.value)
     except ValidationError as error:

@@ -64,7 +64,7 @@ async def put_floorplan(
     if content_type not in _FORMATS:
         detail = f"Content-Type is {content_type or 'missing'}; send {', '.join(_FORMATS)}"
         raise ProblemError(UNSUPPORTED_TYPE, detail, headers={"Accept": ", ".join(_FORMATS)})
-    content = await read_raw(request, service.settings.max_body_bytes)
+    content = await read_raw(request, service.settings)
     try:
         plan = await asyncio.to_thread(read_plan, content, _FORMATS[content_type])
     except FloorPlanError as error:

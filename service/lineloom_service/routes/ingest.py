@@ -25,7 +25,7 @@ async def post_scans(
 ) -> Response:
     """Take one scan, or `{"scans": [...]}`. 202 means: on disk. Sending again is harmless."""
     settings = service.settings
-    body = await read_body(request, settings.max_body_bytes)
+    body = await read_body(request, settings)
     intake = await take_in(body, settings.max_batch)
     known = await service.store.site(site)
     appended = await service.store.append_scans(

@@ -30,7 +30,7 @@ router = APIRouter(tags=["match"])
 )
 async def post_localize(site: KnownSite, request: Request, service: ServiceDep) -> Response:
     """Tell where one scan, or the latest of `{"scans": [...]}`, was taken; adds nothing."""
-    scans = _checked(await read_body(request, service.settings.max_body_bytes))
+    scans = _checked(await read_body(request, service.settings))
     found: Localisation = await ask(service, site, "localise", scans)
     return answer(to_localization(site.name, found))
 

@@ -21,7 +21,7 @@ router = APIRouter(tags=["match"])
 @router.post("/v1/match", response_model=wire.MatchAnswer, openapi_extra=body_of("MatchRequest"))
 async def post_match(request: Request, service: ServiceDep) -> Response:
     """Find where `current` was taken, seen from `reference`, without any guess."""
-    body = await read_body(request, service.settings.max_body_bytes)
+    body = await read_body(request, service.settings)
     try:
         pair = wire.MatchRequest.model_validate(
             body.value, context=STRICT_JSON if body.is_json else None

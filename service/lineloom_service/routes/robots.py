@@ -51,7 +51,7 @@ async def put_robot(
     site: SiteName, robot: RobotName, request: Request, service: ServiceDep
 ) -> Response:
     """Set how the lidar sits on the robot, for the scans that follow; without mount: nowhere."""
-    body = await read_body(request, service.settings.max_body_bytes)
+    body = await read_body(request, service.settings)
     try:
         settings = wire.RobotSettings.model_validate(body.value)
     except ValidationError as error:
