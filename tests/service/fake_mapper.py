@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import hashlib
 import itertools
+import json
 import math
 import os
 import pickle
 import signal
 import time
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -50,6 +52,9 @@ UNSEEN, UNSAVED = 670.0, 671.0
 """Stamps of scans after which it can make no view, or no snapshot, until the next scan."""
 
 SECONDS_PER_SCAN = float(os.environ.get("FAKE_MAPPER_SECONDS", "0"))
+SEALED = 16
+"""Scans in a chapter of its history."""
+
 GENTLE = bool(os.environ.get("FAKE_MAPPER_GENTLE"))
 """Then it fails on scans only."""
 
@@ -59,12 +64,16 @@ ONCE_FILE = os.environ.get("FAKE_MAPPER_ONCE", "")
 class FakeMapper:
     """Each robot drives straight on: scan n is at x = n. All robots are one component, `c1`,
     but those called `alone…`, which have their own.
+
+    Its history is every scan it took, whoever was forgotten since, sealed in chapters.
     """
 
     def __init__(self) -> None:
         self._chain = b""
         self._version = 0
         self._latest = 0.0
+        self._history: list[tuple[str, str, int, float]] = []
+        self._forgotten: dict[str, int] = {}  # up to which length of the history
         self._scans: dict[str, list[tuple[str, int, float]]] = {}
         self._mounts: dict[str, Mount] = {}
         self._retracted: dict[str, int] = {}
@@ -84,6 +93,7 @@ class FakeMapper:
         if scan.stamp == RAISES_ONCE and not Path(ONCE_FILE).exists():
             Path(ONCE_FILE).touch()
             raise MemoryError
+        self._history.append((robot, scan.session, scan.seq, scan.stamp))
         self._scans.setdefault(robot, []).append((scan.session, scan.seq, scan.stamp))
         return Changes(placed=True)
 
@@ -96,6 +106,7 @@ class FakeMapper:
         self._version += 1
         self._link(robot, "forget", b"")
         self._scans.pop(robot, None)
+        self._forgotten[robot] = len(self._history)
 
     def retract(self, constraint: str) -> None:
         self._version += 1
@@ -170,13 +181,29 @@ class FakeMapper:
     def snapshot(self, known: int = 0) -> Snapshot:
         if self._latest == UNSAVED:
             raise ValueError("this cannot be pickled")
-        return Snapshot(pickle.dumps(self.__dict__), known)
+        end = len(self._history) // SEALED
+        state = {**self.__dict__, "_history": self._history[end * SEALED :], "chapters": end}
+        del state["_scans"]
+        chapters = tuple(self._chapter(number) for number in range(known, end))
+        return Snapshot(pickle.dumps(state), known, chapters)
 
     @classmethod
     def restore(cls, snapshot: Snapshot) -> FakeMapper:
         mapper = cls()
-        mapper.__dict__.update(pickle.loads(snapshot.state))
+        state = pickle.loads(snapshot.state)
+        if (snapshot.first, snapshot.end) != (0, state.pop("chapters")):
+            raise ValueError(f"these are not its chapters: {snapshot.first} to {snapshot.end}")
+        sealed = [row for chapter in snapshot.chapters for row in _unsealed(chapter)]
+        mapper.__dict__.update(state)
+        mapper._history = [*sealed, *mapper._history]
+        for number, (robot, session, seq, stamp) in enumerate(mapper._history):
+            if number >= mapper._forgotten.get(robot, 0):
+                mapper._scans.setdefault(robot, []).append((session, seq, stamp))
         return mapper
+
+    def _chapter(self, number: int) -> bytes:
+        rows = self._history[number * SEALED : (number + 1) * SEALED]
+        return zlib.compress(json.dumps(rows).encode())
 
     def _link(self, *parts: str | bytes) -> None:
         digest = hashlib.sha256(self._chain)
@@ -255,6 +282,12 @@ class FakeMapper:
             )
         ]
         return accepted + rejected if keyframes else []
+
+
+def _unsealed(chapter: bytes) -> list[tuple[str, str, int, float]]:
+    return [
+        (str(r), str(s), int(n), float(t)) for r, s, n, t in json.loads(zlib.decompress(chapter))
+    ]
 
 
 def _component(robot: str) -> str:

@@ -6,26 +6,20 @@ import asyncio
 import os
 import signal
 import sys
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 
 import numpy as np
 import pytest
 from lineloom_core.geometry import Pose
-from lineloom_core.mapping.site_view import SiteView
 from lineloom_core.scan import Mount, Scan
-from lineloom_service.engine.conductor import Conductor
 from lineloom_service.engine.local_engine import LocalEngine
-from lineloom_service.engine.published import Published
-from lineloom_service.settings import Settings
-from lineloom_service.store.choice import database_at
 from lineloom_service.store.codec import decode_scan, encode_mount, encode_scan
-from lineloom_service.store.records import NewScan, SnapshotRecord
-from lineloom_service.store.sql_store import SqlStore
+from lineloom_service.store.records import SnapshotRecord
+
+from tests.service.system import System, fingerprint, running
 
 RAISES, CRASHES, RAISES_ONCE, HANGS = 666.0, 667.0, 668.0, 669.0
-FAKE = "fake_mapper:FakeMapper"
 DATABASE_URL: str | None = None
 """Set for each test: None for SQLite."""
 
@@ -35,86 +29,8 @@ def on_each_database(database_url: str | None, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(sys.modules[__name__], "DATABASE_URL", database_url)
 
 
-def _scan(seq: int, stamp: float | None = None) -> NewScan:
-    rng = np.random.default_rng(seq)
-    scan = Scan.checked(
-        rng.uniform(0.5, 20.0, 20),
-        angle_min=-1.0,
-        angle_increment=0.1,
-        range_min=0.1,
-        range_max=30.0,
-        stamp=float(seq) if stamp is None else stamp,
-        seq=seq,
-    )
-    return NewScan("0", seq, encode_scan(scan))
-
-
-class System:
-    """Store, engine and conductor, as the service puts them together."""
-
-    def __init__(self, path: Path, **changes: object) -> None:
-        values: dict[str, object] = {
-            "data_dir": path,
-            "database_url": DATABASE_URL,
-            "gap_window_s": 0.1,
-            "chunk": 8,
-            "publish_every_s": 0.05,
-            "snapshot_every": 50,
-            "snapshot_idle_s": 60.0,
-        }
-        self.settings = Settings.model_validate({**values, **changes})
-        self.store = SqlStore(
-            database_at(self.settings.database_url, self.settings.database_path),
-            gap_window_s=self.settings.gap_window_s,
-            max_held=100,
-        )
-        self.engine = LocalEngine(
-            1,
-            publish_every_s=self.settings.publish_every_s,
-            patience_s=self.settings.entry_timeout_s,
-            mapper=FAKE,
-            warm_up=None,
-        )
-        self.conductor = Conductor(self.store, self.engine, self.settings)
-
-    async def post(self, seqs: range, *, stamps: dict[int, float] | None = None) -> None:
-        scans = [_scan(seq, (stamps or {}).get(seq)) for seq in seqs]
-        await self.store.append_scans("site", "r", scans, processed=0, limit=10**9)
-
-    async def published(self) -> Published:
-        record = await self.store.site("site")
-        assert record is not None
-        return self.conductor.published(record.id)
-
-    async def until(self, done: Callable[[Published], bool]) -> Published:
-        for _ in range(2000):
-            published = await self.published()
-            if done(published):
-                return published
-            await asyncio.sleep(0.01)
-        raise AssertionError(f"never happened; last seen {published.position}")
-
-    async def caught_up(self) -> Published:
-        record = await self.store.site("site")
-        assert record is not None
-        end = record.position
-        return await self.until(lambda p: p.position >= end)
-
-
-@asynccontextmanager
-async def _running(path: Path, **changes: object) -> AsyncIterator[System]:
-    system = System(path, **changes)
-    await system.store.open()
-    await system.conductor.start()
-    try:
-        yield system
-    finally:
-        await system.conductor.stop()
-        await system.store.close()
-
-
-def _fingerprint(view: SiteView) -> tuple[int, tuple[str, ...]]:
-    return view.version, tuple(line.id for line in view.lines)
+def _running(path: Path, **changes: object) -> AbstractAsyncContextManager[System]:
+    return running(path, DATABASE_URL, **changes)
 
 
 @pytest.fixture(scope="module")
@@ -122,9 +38,9 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[int, tuple[st
     """The view after scans 0..199 in a run that nothing happened to."""
 
     async def run() -> tuple[int, tuple[str, ...]]:
-        async with _running(tmp_path_factory.mktemp("undisturbed"), database_url=None) as system:
+        async with running(tmp_path_factory.mktemp("undisturbed"), None) as system:
             await system.post(range(200))
-            return _fingerprint((await system.caught_up()).view)
+            return fingerprint((await system.caught_up()).view)
 
     return asyncio.run(run())
 
@@ -160,7 +76,7 @@ async def test_a_killed_worker_is_replaced_and_the_map_is_the_same(
             await system.until(lambda p, at=position: p.position >= at)  # type: ignore[misc]
             os.kill(system.engine.pids[0], signal.SIGKILL)
         published = await system.caught_up()
-        assert _fingerprint(published.view) == undisturbed
+        assert fingerprint(published.view) == undisturbed
         assert (published.scans, published.skipped) == (200, 0)
         assert system.conductor.skips(1) == []
 
@@ -196,7 +112,7 @@ async def test_a_restart_goes_on_from_the_snapshot(
         assert snapshot is not None
         assert snapshot.position == 120  # saved when the first service stopped
         await system.post(range(120, 200))
-        assert _fingerprint((await system.caught_up()).view) == undisturbed
+        assert fingerprint((await system.caught_up()).view) == undisturbed
 
 
 async def test_an_unreadable_snapshot_is_dropped_and_the_log_replayed(
@@ -207,7 +123,7 @@ async def test_an_unreadable_snapshot_is_dropped_and_the_log_replayed(
         await system.caught_up()
         await system.store.save_snapshot(1, SnapshotRecord(200, 200, "0.1.0", b"rubbish"))
     async with _running(tmp_path) as system:
-        assert _fingerprint((await system.caught_up()).view) == undisturbed
+        assert fingerprint((await system.caught_up()).view) == undisturbed
 
 
 async def test_a_scan_that_makes_the_mapper_raise_is_skipped_for_good(tmp_path: Path) -> None:
@@ -218,10 +134,10 @@ async def test_a_scan_that_makes_the_mapper_raise_is_skipped_for_good(tmp_path: 
         (skip,) = system.conductor.skips(1)
         assert (skip.seq, skip.position) == (30, 31)
         assert skip.reason == "ValueError: this scan is cursed"
-        before = _fingerprint(published.view)
+        before = fingerprint(published.view)
     async with _running(tmp_path) as system:
         published = await system.caught_up()
-        assert _fingerprint(published.view) == before
+        assert fingerprint(published.view) == before
         assert (published.scans, published.skipped) == (59, 1)
 
 

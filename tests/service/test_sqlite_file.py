@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 import sqlalchemy as sa
-from lineloom_service.store.migrate import migrate
+from lineloom_service.store.migrate import downgrade, migrate
 from lineloom_service.store.records import NewScan, SnapshotRecord, StoreError
 from lineloom_service.store.sql_store import SqlStore
 from lineloom_service.store.sqlite_database import SqliteDatabase, sqlite_engine
@@ -64,6 +64,41 @@ async def test_a_database_of_the_first_version_is_upgraded_with_all_it_holds(
     ]
     await store.save_snapshot(record.id, SnapshotRecord(6, 5, "v1", b"state"))
     await store.close()
+
+
+async def test_a_snapshot_from_before_there_were_chapters_goes_on_from_none(
+    tmp_path: Path,
+) -> None:
+    _old_database(tmp_path)
+    engine = sqlite_engine(tmp_path / "lineloom.db")
+    with engine.begin() as connection:
+        migrate(connection, "0007")
+        connection.exec_driver_sql("INSERT INTO snapshots VALUES (1, 4, 3, 'v1', x'6f6c64')")
+    engine.dispose()
+    store = _store(tmp_path)
+    await store.open()
+    snapshot = await store.latest_snapshot(1, "v1")
+    assert snapshot == SnapshotRecord(4, 3, "v1", b"old")
+    assert [chapter async for chapter in store.chapters(1, snapshot)] == []
+    await store.close()
+
+
+async def test_going_back_a_version_leaves_no_snapshot_without_its_chapters(
+    tmp_path: Path,
+) -> None:
+    _old_database(tmp_path)
+    store = _store(tmp_path)
+    await store.open()
+    await store.save_snapshot(1, SnapshotRecord(2, 1, "v1", b"whole"))
+    await store.save_snapshot(1, SnapshotRecord(4, 3, "v1", b"rest", 0, (b"chapter",)))
+    await store.close()
+    engine = sqlite_engine(tmp_path / "lineloom.db")
+    with engine.begin() as connection:
+        downgrade(connection, "0007")
+        left = connection.exec_driver_sql("SELECT * FROM snapshots").fetchall()
+        assert [tuple(row) for row in left] == [(1, 2, 1, "v1", b"whole")]
+        assert "chapters" not in sa.inspect(connection).get_table_names()
+    engine.dispose()
 
 
 async def test_the_upgrade_leaves_a_copy_of_the_database_as_it_was(tmp_path: Path) -> None:

@@ -5,15 +5,19 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import deque
-from collections.abc import Awaitable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from lineloom_service.engine.current_entry import BUSY
+from lineloom_core.mapping.snapshot import Snapshot
+
+from lineloom_service.engine.current_entry import BUSY, RESTORING
 from lineloom_service.engine.mapper import SITE_MAPPER, WARM_UP
 from lineloom_service.engine.messages import (
     Answered,
     Ask,
+    Chapter,
+    ChapterTaken,
     Failed,
     Fed,
     Feed,
@@ -61,10 +65,14 @@ class _Slot:
 
 @dataclass(slots=True)
 class _Site:
-    """A hosted site: the number of its start and the answers awaited, in order."""
+    """A hosted site: the number of its start and the answers awaited, in order.
+
+    gathering: the chapters that it is to go on from are on their way, and nothing else is taken.
+    """
 
     slot: _Slot
     run: int = 0
+    gathering: bool = False
     awaited: deque[asyncio.Future[Any]] = field(default_factory=deque)
 
     def fail(self, error: Exception) -> None:
@@ -147,7 +155,13 @@ class LocalEngine:
         """Return how long the workers' stages took so far."""
         return self._durations
 
-    async def start_site(self, site: int, position: int, snapshot: bytes | None) -> None:
+    async def start_site(
+        self,
+        site: int,
+        position: int,
+        state: bytes | None,
+        chapters: AsyncIterator[bytes] | None = None,
+    ) -> None:
         """Host a site on the worker that has fewest, or on the one that has it already."""
         hosted = self._sites.get(site)
         if hosted is None:
@@ -157,7 +171,27 @@ class LocalEngine:
         await hosted.slot.ready.wait()
         hosted.fail(WorkerDiedError(None, "the site was started again", killed=False))
         hosted.run += 1
-        await self._ask(hosted, StartSite(site, hosted.run, position, snapshot))
+        hosted.gathering = chapters is not None
+        if chapters is not None:
+            await self._gather(site, hosted, chapters)
+            hosted.gathering = False
+        await self._ask(hosted, StartSite(site, hosted.run, position, state))
+
+    async def _gather(self, site: int, hosted: _Site, chapters: AsyncIterator[bytes]) -> None:
+        """Send chapters to the process that is there now, each when it has the one before."""
+        run, process = hosted.run, hosted.slot.process
+
+        def check() -> None:
+            """While a chapter was read nobody waited for an answer that could have told this."""
+            if hosted.slot.process is not process:
+                raise WorkerDiedError(None, hosted.slot.last_words, killed=False)
+            if self._sites.get(site) is not hosted or hosted.run != run:
+                raise WorkerDiedError(None, "the site was started again", killed=False)
+
+        async for chapter in chapters:
+            check()
+            await self._ask(hosted, Chapter(site, run, chapter))
+        check()
 
     def feed(
         self,
@@ -167,23 +201,25 @@ class LocalEngine:
         *,
         caught_up: bool,
         publish: bool = False,
-    ) -> Awaitable[bytes]:
+    ) -> Awaitable[object]:
         """Send entries to the site's worker."""
         hosted = self._sites[site]
         order = Feed(site, hosted.run, tuple(entries), through, caught_up, publish)
         return self._ask(hosted, order)
 
-    async def snapshot(self, site: int) -> bytes:
+    async def snapshot(self, site: int, known: int = 0) -> Snapshot:
         """Ask the site's worker for the mapper's state."""
         hosted = self._sites[site]
-        data: bytes = await self._ask(hosted, TakeSnapshot(site, hosted.run))
-        return data
+        snapshot: Snapshot = await self._ask(hosted, TakeSnapshot(site, hosted.run, known))
+        return snapshot
 
     def ask(self, site: int, question: str, *arguments: object) -> Awaitable[Any]:
         """Ask the site's mapper."""
         hosted = self._sites.get(site)
         if hosted is None:
             raise WorkerDiedError(None, "the site is not hosted yet", killed=False)
+        if hosted.gathering:
+            raise WorkerDiedError(None, "the site is being restored", killed=False)
         return self._ask(hosted, Ask(site, hosted.run, question, arguments))
 
     def stop_site(self, site: int) -> None:
@@ -197,7 +233,7 @@ class LocalEngine:
             hosted.slot.process.send(StopSite(site))
 
     def _ask(
-        self, hosted: _Site, order: StartSite | Feed | TakeSnapshot | Ask
+        self, hosted: _Site, order: Chapter | StartSite | Feed | TakeSnapshot | Ask
     ) -> asyncio.Future[Any]:
         """Send an order; its answer comes in turn, as a worker obeys in order."""
         answer: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
@@ -265,18 +301,21 @@ class LocalEngine:
         slot.stillborn = 0 if process.ready else slot.stillborn + 1
         slot.ready.clear()
         slot.process = None
-        for site in slot.sites:
-            blamed = process.blamed
-            to_blame = blamed is not None and blamed[0] == site and blamed[1] != BUSY
-            position = blamed[1] if to_blame and blamed is not None else None
-            self._sites[site].fail(
-                WorkerDiedError(position, slot.last_words, killed=process.killed)
-            )
+        for number in slot.sites:
+            site, blamed = self._sites[number], process.blamed
+            position: int | None = None
+            if blamed is not None and blamed[0] == number and blamed[1] != BUSY:
+                position = blamed[1]
+            elif blamed is None and site.gathering:
+                position = RESTORING  # most likely it had no room for the chapters
+            site.fail(WorkerDiedError(position, slot.last_words, killed=process.killed))
         pause = min(_RESPAWN_LIMIT_S, _RESPAWN_S * 2**slot.stillborn) if slot.stillborn else 0.0
         asyncio.get_running_loop().call_later(pause, self._spawn, slot)
 
 
-def _resolve(answer: asyncio.Future[Any], report: Fed | Started | SnapshotTaken | Answered) -> None:
+def _resolve(
+    answer: asyncio.Future[Any], report: ChapterTaken | Fed | Started | SnapshotTaken | Answered
+) -> None:
     if answer.done():
         return
     if isinstance(report, Answered) and report.failure is not None:
@@ -286,4 +325,4 @@ def _resolve(answer: asyncio.Future[Any], report: Fed | Started | SnapshotTaken 
     elif isinstance(report, SnapshotTaken) and report.failure is not None:
         answer.set_exception(SnapshotFailedError(report.failure))
     else:
-        answer.set_result(report.data if isinstance(report, SnapshotTaken) else b"")
+        answer.set_result(report.snapshot if isinstance(report, SnapshotTaken) else None)

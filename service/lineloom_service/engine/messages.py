@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.snapshot import Snapshot
 
 from lineloom_service.engine.view_parts import ViewParts
 from lineloom_service.observation.durations import Durations
@@ -16,13 +17,22 @@ from lineloom_service.store.records import LogEntry
 
 
 @dataclass(frozen=True, slots=True)
+class Chapter:
+    """Keep this for the start of the site that comes next. Chapters come in order."""
+
+    site: int
+    run: int
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
 class StartSite:
-    """Host a site."""
+    """Host a site. state: of a snapshot that goes on from the chapters that came before."""
 
     site: int
     run: int
     position: int
-    snapshot: bytes | None
+    state: bytes | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,10 +49,11 @@ class Feed:
 
 @dataclass(frozen=True, slots=True)
 class TakeSnapshot:
-    """Answer with the mapper's state."""
+    """Answer with the mapper's state, without the first `known` chapters of its history."""
 
     site: int
     run: int
+    known: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,12 +73,20 @@ class StopSite:
     site: int
 
 
-Order = StartSite | Feed | TakeSnapshot | Ask | StopSite
+Order = Chapter | StartSite | Feed | TakeSnapshot | Ask | StopSite
 
 
 @dataclass(frozen=True, slots=True)
 class Ready:
     """The worker is warm."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChapterTaken:
+    """A chapter has arrived."""
+
+    site: int
+    run: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,11 +145,11 @@ class Stopped:
 
 @dataclass(frozen=True, slots=True)
 class SnapshotTaken:
-    """The state after all that was fed. failure: why there is none."""
+    """The snapshot after all that was fed, its state compressed. failure: why there is none."""
 
     site: int
     run: int
-    data: bytes = b""
+    snapshot: Snapshot | None = None
     failure: str | None = None
 
 
@@ -161,6 +180,17 @@ class Timed:
     durations: Durations
 
 
-Report = Timed | Ready | Started | Fed | View | ViewFailed | SnapshotTaken | Answered | Failed
+Report = (
+    Timed
+    | Ready
+    | ChapterTaken
+    | Started
+    | Fed
+    | View
+    | ViewFailed
+    | SnapshotTaken
+    | Answered
+    | Failed
+)
 Sent = Report | EncodedView | Stopped
 """What a worker sends; `WorkerProcess` makes reports of it."""

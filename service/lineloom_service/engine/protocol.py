@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from typing import Any, Protocol
 
 from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.snapshot import Snapshot
 
 from lineloom_service.observation.durations import Durations
 from lineloom_service.store.records import LogEntry
@@ -83,10 +84,18 @@ class Engine(Protocol):
         """Return how long the mappers' stages took so far."""
         ...
 
-    async def start_site(self, site: int, position: int, snapshot: bytes | None) -> None:
+    async def start_site(
+        self,
+        site: int,
+        position: int,
+        state: bytes | None,
+        chapters: AsyncIterator[bytes] | None = None,
+    ) -> None:
         """Host a site from a snapshot taken after the entry at `position`, or from nothing.
 
-        Replaces the site's mapper where there is one. Raises RestoreFailedError.
+        state: as `snapshot` returned it. chapters: all that it goes on from, in order; one is read
+        when the one before has arrived where the site is hosted, and what reading raises passes
+        through. Replaces the site's mapper where there is one. Raises RestoreFailedError.
         """
         ...
 
@@ -107,8 +116,12 @@ class Engine(Protocol):
         """
         ...
 
-    async def snapshot(self, site: int) -> bytes:
-        """Return the mapper's state after all that was fed. Raises SnapshotFailedError."""
+    async def snapshot(self, site: int, known: int = 0) -> Snapshot:
+        """Return the mapper's state after all that was fed, compressed.
+
+        known: how many chapters of its history are kept already: those from there on come with it.
+        Raises SnapshotFailedError.
+        """
         ...
 
     def ask(self, site: int, question: str, *arguments: object) -> Awaitable[Any]:

@@ -20,7 +20,14 @@ from lineloom_service.engine.protocol import (
 )
 from lineloom_service.engine.published import Published
 from lineloom_service.store.protocol import Store
-from lineloom_service.store.records import LogEntry, SiteRecord, Skip, SnapshotRecord, StoreError
+from lineloom_service.store.records import (
+    ChapterLostError,
+    LogEntry,
+    SiteRecord,
+    Skip,
+    SnapshotRecord,
+    StoreError,
+)
 
 _LOG = logging.getLogger(__name__)
 
@@ -85,6 +92,8 @@ class SiteRunner:
         self._troubles: dict[str, str] = {}
         self._save_at = 0.0
         self._sent = self._done = self._saved = 0
+        self._chapters = 0
+        """How many of the mapper's chapters are saved."""
         self._scans_sent = self._scans_done = 0
         self._marks: dict[int, int] = {}
         self._under_way: deque[tuple[asyncio.Future[object], int, int]] = deque()
@@ -133,7 +142,7 @@ class SiteRunner:
                 if death.position is not None:
                     how = "killed" if death.killed else "crashed"
                     await self._strike(death.position, how, death.reason)
-            except RestoreFailedError as failure:
+            except (RestoreFailedError, ChapterLostError) as failure:
                 await self._drop_snapshot(str(failure))
             except StoreError as error:
                 if "log" not in self._troubles:
@@ -155,8 +164,15 @@ class SiteRunner:
             )
             await self._recorder.settled(self.site)
         try:
-            data = await self._engine.snapshot(self.site)
-            record = SnapshotRecord(self._done, self._scans_done, self._producer, data)
+            taken = await self._engine.snapshot(self.site, self._chapters)
+            record = SnapshotRecord(
+                self._done,
+                self._scans_done,
+                self._producer,
+                taken.state,
+                taken.first,
+                taken.chapters,
+            )
             await self._store.save_snapshot(self.site, record)
         except (SnapshotFailedError, StoreError) as error:
             if "saving" not in self._troubles:
@@ -165,7 +181,7 @@ class SiteRunner:
             self._save_at = time.monotonic() + _SAVE_AGAIN_S
         else:
             self._troubles.pop("saving", None)
-            self._saved = self._done
+            self._saved, self._chapters = self._done, record.end
 
     async def finish(self) -> None:
         """After `run` was cancelled: wait for what is under way and save."""
@@ -183,9 +199,7 @@ class SiteRunner:
         self.expected = min(self._end, max(self.expected, self._recorded, self._saved))
         self._marks = {self._done: self._scans_done}
         self._under_way.clear()
-        await self._engine.start_site(
-            self.site, self._saved, None if snapshot is None else snapshot.data
-        )
+        await self._start(snapshot)
         self._troubles.pop("start", None)
         while True:
             self._wake.clear()
@@ -199,6 +213,14 @@ class SiteRunner:
             if unsaved >= self._pace.snapshot_every and time.monotonic() >= self._save_at:
                 await self._drain()
                 await self.save()
+
+    async def _start(self, snapshot: SnapshotRecord | None) -> None:
+        self._chapters = 0 if snapshot is None else snapshot.end
+        if snapshot is None:
+            await self._engine.start_site(self.site, 0, None)
+        else:
+            chapters = self._store.chapters(self.site, snapshot)
+            await self._engine.start_site(self.site, snapshot.position, snapshot.data, chapters)
 
     async def _send(self) -> None:
         # The next events go on from the view right there, so that view has to be published.
@@ -278,4 +300,8 @@ class SiteRunner:
             await asyncio.sleep(5.0)
             return
         _LOG.error("site %s: snapshot %d is unreadable: %s", self.name, self._saved, reason)
-        await self._store.drop_snapshot(self.site, self._saved)
+        try:
+            await self._store.drop_snapshot(self.site, self._saved)
+        except StoreError:
+            _LOG.exception("site %s: snapshot %d could not be removed", self.name, self._saved)
+            await asyncio.sleep(_AGAIN_S)

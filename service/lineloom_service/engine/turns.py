@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from lineloom_service.engine.messages import Order, StartSite, StopSite
+from lineloom_service.engine.messages import Chapter, Order, StartSite, StopSite
 
 
 class Turns:
@@ -25,7 +25,7 @@ class Turns:
     def put(self, order: Order) -> None:
         """Take an order. What waits for a site that is started anew or stopped is void."""
         site = order.site
-        if isinstance(order, StartSite | StopSite):
+        if isinstance(order, Chapter | StartSite | StopSite):
             self._orders.pop(site, None)
         if site not in self._orders:
             least = min((self._used[other] for other in self._orders), default=0.0)

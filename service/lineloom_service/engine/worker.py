@@ -9,7 +9,7 @@ import signal
 import threading
 import time
 import zlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
 
 from lineloom_core import timing
@@ -20,6 +20,8 @@ from lineloom_service.engine.mapper import QUESTIONS, Mapper, MapperFactory, app
 from lineloom_service.engine.messages import (
     Answered,
     Ask,
+    Chapter,
+    ChapterTaken,
     EncodedView,
     Failed,
     Fed,
@@ -67,6 +69,14 @@ class _Hosted:
     encoder: ViewEncoder = field(default_factory=ViewEncoder)
 
 
+@dataclass(slots=True)
+class _Gathered:
+    """The chapters that a start of a site will go on from."""
+
+    run: int
+    chapters: list[bytes] = field(default_factory=list)
+
+
 class Worker:
     """Serves orders until the pipe closes.
 
@@ -85,6 +95,7 @@ class Worker:
         self._factory = factory
         self._publish_every_s = publish_every_s
         self._sites: dict[int, _Hosted] = {}
+        self._gathered: dict[int, _Gathered] = {}
         self._turns = Turns()
         self._durations = Durations()
         timing.listen(self._durations.observe)
@@ -121,7 +132,9 @@ class Worker:
         """Carry out an order, of a feed one entry only; False while there is more of it."""
         if isinstance(order, Feed):
             return self._feed(order)
-        if isinstance(order, StartSite):
+        if isinstance(order, Chapter):
+            self._gather(order)
+        elif isinstance(order, StartSite):
             self._start(order)
         elif isinstance(order, TakeSnapshot):
             self._snapshot(order)
@@ -129,17 +142,29 @@ class Worker:
             self._answer(order)
         elif isinstance(order, StopSite):
             self._sites.pop(order.site, None)
+            self._gathered.pop(order.site, None)
             self._connection.send(Stopped(order.site))
         return True
 
+    def _gather(self, order: Chapter) -> None:
+        self._sites.pop(order.site, None)  # what is to be replaced is not kept beside it
+        gathered = self._gathered.get(order.site)
+        if gathered is None or gathered.run != order.run:
+            gathered = self._gathered[order.site] = _Gathered(order.run)
+        gathered.chapters.append(order.data)
+        self._connection.send(ChapterTaken(order.site, order.run))
+
     def _start(self, order: StartSite) -> None:
         self._sites.pop(order.site, None)
+        gathered = self._gathered.pop(order.site, None)
+        chapters = () if gathered is None or gathered.run != order.run else gathered.chapters
         self._current.mark(order.site, RESTORING)
         try:
-            if order.snapshot is None:
+            if order.state is None:
                 mapper = self._factory()
             else:
-                mapper = self._factory.restore(Snapshot(zlib.decompress(order.snapshot)))
+                state = zlib.decompress(order.state)
+                mapper = self._factory.restore(Snapshot(state, 0, tuple(chapters)))
         except Exception as error:
             self._connection.send(Started(order.site, order.run, describe(error)))
             return
@@ -190,9 +215,10 @@ class Worker:
             return
         self._current.mark(order.site, BUSY)
         try:
-            # Four times smaller at the quickest level.
             begin = time.perf_counter()
-            data = zlib.compress(hosted.mapper.snapshot().state, 1)
+            snapshot = hosted.mapper.snapshot(order.known)
+            # Four times smaller at the quickest level; chapters are as small as they get.
+            snapshot = replace(snapshot, state=zlib.compress(snapshot.state, 1))
             self._durations.observe("snapshot", time.perf_counter() - begin)
         except Exception as error:
             # The map is as it was, and no entry is to blame: the site goes on without.
@@ -201,7 +227,7 @@ class Worker:
             return
         finally:
             self._current.clear()
-        self._connection.send(SnapshotTaken(order.site, order.run, data))
+        self._connection.send(SnapshotTaken(order.site, order.run, snapshot))
 
     def _answer(self, order: Ask) -> None:
         hosted = self._hosted(order)

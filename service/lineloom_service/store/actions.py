@@ -22,15 +22,14 @@ from lineloom_service.store.records import (
     EventBatch,
     NewScan,
     Skip,
-    SnapshotRecord,
     StoreError,
     ViewRecord,
 )
+from lineloom_service.store.snapshots import purge_chapters
 from lineloom_service.store.transaction import Transaction
 
 _FORGET_EVENTS_EVERY = 64
 _PURGE_PORTION = 2_000
-_SNAPSHOTS_KEPT = 2
 
 
 def append_scans(
@@ -145,7 +144,7 @@ def purge_portion(tx: Transaction) -> bool:
     c = tables.entries.c
     portion = select(c.id).where(c.site_id == site_id).limit(_PURGE_PORTION)
     gone = connection.execute(delete(tables.entries).where(c.id.in_(portion)))
-    if gone.rowcount == 0:
+    if gone.rowcount == 0 and not purge_chapters(connection, site_id):
         robots = select(tables.robots.c.id).where(tables.robots.c.site_id == site_id)
         connection.execute(delete(tables.streams).where(tables.streams.c.robot_id.in_(robots)))
         t = tables
@@ -159,42 +158,6 @@ def release_due(tx: Transaction, now: float) -> None:
     """Release the scans that have waited long enough."""
     for site, robot in list(tx.ledger.waiting.values()):
         tx.release_scans(site, robot, now)
-
-
-def save_snapshot(tx: Transaction, site_id: int, snapshot: SnapshotRecord) -> None:
-    """Keep a snapshot and the last one before it. Nothing is kept of a site that is gone."""
-    if all(site.id != site_id for site in tx.ledger.sites.values()):
-        return
-    c = tables.snapshots.c
-    tx.connection.execute(
-        delete(tables.snapshots).where(c.site_id == site_id, c.position == snapshot.position)
-    )
-    tx.connection.execute(
-        insert(tables.snapshots).values(
-            site_id=site_id,
-            position=snapshot.position,
-            scans=snapshot.scans,
-            producer=snapshot.producer,
-            data=snapshot.data,
-        )
-    )
-    kept = (
-        select(c.position)
-        .where(c.site_id == site_id)
-        .order_by(c.position.desc())
-        .limit(_SNAPSHOTS_KEPT)
-    )
-    tx.connection.execute(
-        delete(tables.snapshots).where(c.site_id == site_id, c.position.not_in(kept))
-    )
-
-
-def drop_snapshot(tx: Transaction, site_id: int, position: int) -> None:
-    """Remove one snapshot."""
-    c = tables.snapshots.c
-    tx.connection.execute(
-        delete(tables.snapshots).where(c.site_id == site_id, c.position == position)
-    )
 
 
 def record_skip(tx: Transaction, site_id: int, position: int, reason: str) -> Skip:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
 from typing import Literal, Protocol
 
 from lineloom_service.security.token import TokenRecord
@@ -124,11 +124,21 @@ class Store(Protocol):
         ...
 
     async def save_snapshot(self, site_id: int, snapshot: SnapshotRecord) -> None:
-        """Keep a snapshot; older ones but the last go."""
+        """Keep a snapshot with its new chapters; older ones but the last go.
+
+        So do the chapters that none of those kept goes on from.
+        """
         ...
 
     async def latest_snapshot(self, site_id: int, producer: str) -> SnapshotRecord | None:
-        """Return the newest snapshot that `producer` wrote."""
+        """Return the newest snapshot that `producer` wrote, without chapters."""
+        ...
+
+    def chapters(self, site_id: int, snapshot: SnapshotRecord) -> AsyncIterator[bytes]:
+        """Read the chapters that a snapshot goes on from, each when it is asked for.
+
+        Raises ChapterLostError where one is not there as it was saved.
+        """
         ...
 
     async def drop_snapshot(self, site_id: int, position: int) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sqlalchemy import Connection, select
 
 from lineloom_service.store import tables
-from lineloom_service.store.records import EventBatch, LogEntry, Skip, SnapshotRecord, ViewRecord
+from lineloom_service.store.records import EventBatch, LogEntry, Skip, ViewRecord
 
 
 def read_revision(connection: Connection) -> int:
@@ -44,19 +44,6 @@ def read_skips(connection: Connection, site_id: int, position: int | None = None
     if position is not None:
         query = query.where(k.position == position)
     return [Skip(*row) for row in connection.execute(query)]
-
-
-def read_snapshot(connection: Connection, site_id: int, producer: str) -> SnapshotRecord | None:
-    """Return the newest snapshot that `producer` wrote."""
-    c = tables.snapshots.c
-    query = (
-        select(c.position, c.scans, c.producer, c.data)
-        .where(c.site_id == site_id, c.producer == producer)
-        .order_by(c.position.desc())
-        .limit(1)
-    )
-    row = connection.execute(query).first()
-    return None if row is None else SnapshotRecord(*row)
 
 
 def read_events(connection: Connection, site_id: int, after: int, limit: int) -> list[EventBatch]:

@@ -75,13 +75,21 @@ class SnapshotRecord:
     """A mapper's state after the entry at `position`.
 
     scans: scan entries among 1..position that the mapper took. producer: the code that wrote it;
-    other code replays the log instead.
+    other code replays the log instead. chapters: of the history that the state goes on from, those
+    from number `first` on; the ones before are kept already. One that was read comes without any.
     """
 
     position: int
     scans: int
     producer: str
     data: bytes
+    first: int = 0
+    chapters: tuple[bytes, ...] = ()
+
+    @property
+    def end(self) -> int:
+        """Number of chapters that the state goes on from."""
+        return self.first + len(self.chapters)
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +139,10 @@ class BacklogFullError(Exception):
         self.pending = pending
         self.limit = limit
         self.robot = robot
+
+
+class ChapterLostError(Exception):
+    """A chapter that a snapshot goes on from is not there, or is not what was saved."""
 
 
 class StoreError(Exception):

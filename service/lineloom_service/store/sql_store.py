@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
 from functools import partial
 from typing import TypeVar
 
@@ -13,7 +13,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from lineloom_service.security.token import TokenRecord
 from lineloom_service.security.token_book import read_tokens
-from lineloom_service.store import actions, files, questions, reads
+from lineloom_service.store import actions, files, questions, reads, snapshots
 from lineloom_service.store.database import Claim, Database, Work
 from lineloom_service.store.files import FileKind, FileRecord
 from lineloom_service.store.group_commit import GroupCommit
@@ -158,19 +158,33 @@ class SqlStore:
         return await self._read(partial(reads.read_skips, site_id=site_id))
 
     async def save_snapshot(self, site_id: int, snapshot: SnapshotRecord) -> None:
-        """Keep a snapshot."""
+        """Keep a snapshot with its new chapters."""
         await self._write_as_engine(
-            partial(actions.save_snapshot, site_id=site_id, snapshot=snapshot)
+            partial(snapshots.save_snapshot, site_id=site_id, snapshot=snapshot)
         )
 
     async def latest_snapshot(self, site_id: int, producer: str) -> SnapshotRecord | None:
         """Return the newest snapshot that `producer` wrote."""
-        return await self._read(partial(reads.read_snapshot, site_id=site_id, producer=producer))
+        return await self._read(
+            partial(snapshots.read_snapshot, site_id=site_id, producer=producer)
+        )
+
+    async def chapters(self, site_id: int, snapshot: SnapshotRecord) -> AsyncIterator[bytes]:
+        """Read the chapters that a snapshot goes on from, each when it is asked for."""
+        for number in range(snapshot.end):
+            yield await self._read(
+                partial(
+                    snapshots.read_chapter,
+                    site_id=site_id,
+                    producer=snapshot.producer,
+                    number=number,
+                )
+            )
 
     async def drop_snapshot(self, site_id: int, position: int) -> None:
         """Remove an unreadable snapshot."""
         await self._write_as_engine(
-            partial(actions.drop_snapshot, site_id=site_id, position=position)
+            partial(snapshots.drop_snapshot, site_id=site_id, position=position)
         )
 
     async def append_events(self, site_id: int, batch: EventBatch, kept: int) -> None:

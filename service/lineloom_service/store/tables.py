@@ -125,6 +125,21 @@ snapshots = Table(
     Column("scans", BigInteger, nullable=False),
     Column("producer", String(128), nullable=False),
     Column("data", LargeBinary, nullable=False),
+    # How many of its producer's chapters it goes on from.
+    Column("chapters", BigInteger, nullable=False, server_default=text("0")),
+)
+
+# The history that snapshots go on from, each piece kept once for all of them.
+chapters = Table(
+    "chapters",
+    metadata,
+    Column("site_id", ForeignKey("sites.id"), primary_key=True, autoincrement=False),
+    Column("producer", String(128), primary_key=True),
+    # From 0, without holes.
+    Column("number", BigInteger, primary_key=True, autoincrement=False),
+    # CRC-32 of the data.
+    Column("crc", BigInteger, nullable=False),
+    Column("data", LargeBinary, nullable=False),
 )
 
 # What was told to those who listen, a row for every published view that told anything.
