@@ -1,19 +1,24 @@
-"""How well a map lies in a plan at a pose: refined, then judged in both directions."""
+"""How well a map lies in a plan at a pose: refined, then judged in both directions.
+
+SciPy is imported where the first map is judged: a service that starts need not wait for it.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
-from scipy.spatial import cKDTree
 
 from lineloom_core.floorplan.samples import Samples
 from lineloom_core.fusion.occupancy import FREE, OCCUPIED, OccupancyGrid
 from lineloom_core.geometry import Pose
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 TOLERANCE_M = 0.3
 """Plan and wall: what is drawn where, plaster, and the map's own error."""
@@ -149,11 +154,15 @@ class Judge:
         occupied = self.grid.cells == OCCUPIED
         if not occupied.any():
             return np.full(occupied.shape, np.inf)
+        from scipy.ndimage import distance_transform_edt
+
         far: NDArray[np.float64] = distance_transform_edt(~occupied, self.grid.resolution)
         return far
 
     @cached_property
     def _tree(self) -> cKDTree:
+        from scipy.spatial import cKDTree
+
         return cKDTree(_embedded(self.plan.points, self.plan.direction))
 
     def _nearest(

@@ -16,7 +16,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from lineloom_core.floorplan.correlation import hypotheses
 from lineloom_core.floorplan.fit import Fit, Judge
 from lineloom_core.floorplan.plan import FloorPlan, lengths
 from lineloom_core.floorplan.samples import Samples
@@ -84,6 +83,9 @@ def register(plan: FloorPlan, lines: NDArray[np.float64], grid: OccupancyGrid) -
 
 
 def _search(plan: FloorPlan, lines: NDArray[np.float64], grid: OccupancyGrid) -> Registration:
+    # Here, so that a service that starts need not wait for SciPy.
+    from lineloom_core.floorplan.correlation import hypotheses
+
     if not _ODD_EXTENT_M[0] <= plan.extent <= _ODD_EXTENT_M[1]:
         return _none(f"the plan measures {plan.extent:.4g} m: is it in metres?")
     judge = judge_of(plan, lines, grid)

@@ -1,18 +1,20 @@
-"""The map as a drawing for CAD (DXF R2010, in metres), by ezdxf."""
+"""The map as a drawing for CAD (DXF R2010, in metres), by ezdxf.
+
+ezdxf is imported when the first map is written: a service that starts need not wait for it.
+"""
 
 from __future__ import annotations
 
 import io
-
-from ezdxf import units
-from ezdxf._options import options
-from ezdxf.document import Drawing
-from ezdxf.filemanagement import new
-from ezdxf.layouts.layout import Modelspace
+from typing import TYPE_CHECKING
 
 from lineloom_core.io.drawing import robot_colour
 from lineloom_core.io.selection import BBox, ComponentContent, select
 from lineloom_core.mapping.site_view import SiteView
+
+if TYPE_CHECKING:
+    from ezdxf.document import Drawing
+    from ezdxf.layouts.layout import Modelspace
 
 _INK = 7  # black on white, white on black
 _VERSION = "R2010"
@@ -27,6 +29,9 @@ def write_map(view: SiteView, component: str | None = None, bbox: BBox | None = 
     Components lie in unrelated frames, each at its own origin: ask for one to have one drawing.
     Raises as `selection.select` does.
     """
+    from ezdxf import units
+    from ezdxf.filemanagement import new
+
     contents = select(view, component, bbox)
     document = new(_VERSION, setup=False)
     document.units = units.M
@@ -64,6 +69,8 @@ def _draw(
 
 def _text(document: Drawing) -> str:
     """Return the document without what differs from run to run."""
+    from ezdxf._options import options
+
     options.write_fixed_meta_data_for_testing = True
     document.header["$FINGERPRINTGUID"] = _SAME
     document.header["$VERSIONGUID"] = _SAME

@@ -8,11 +8,6 @@ import math
 from collections.abc import Iterable, Iterator
 from typing import Any, Literal
 
-from ezdxf import units
-from ezdxf.disassemble import recursive_decompose, to_primitives
-from ezdxf.enums import InsertUnits
-from ezdxf.filemanagement import read as read_dxf
-
 from lineloom_core.floorplan.plan import MOST_LINES, FloorPlan, FloorPlanError
 
 PlanFormat = Literal["geojson", "dxf", "text"]
@@ -130,6 +125,12 @@ def _dxf(text: str) -> Iterator[Segment]:
 
 
 def _dxf_segments(text: str) -> Iterator[Segment]:
+    # Here, so that a service that starts need not wait for it.
+    from ezdxf import units
+    from ezdxf.disassemble import recursive_decompose, to_primitives
+    from ezdxf.enums import InsertUnits
+    from ezdxf.filemanagement import read as read_dxf
+
     document = read_dxf(io.StringIO(text))
     scale = 1.0
     if document.units != InsertUnits.Unitless:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import itertools
 
-import networkx as nx
 import numpy as np
 
 from lineloom_core.mapping.constraint import Constraint, step_id
@@ -135,6 +134,8 @@ def _on(site: SiteMap, place: Place, pair: TrackPair) -> bool:
 
 def _weakest_meeting(site: SiteMap, track_a: str, track_b: str) -> list[Constraint]:
     """The set with the least evidence among those that link two tracks; what is approved stays."""
+    import networkx as nx  # takes longer than all else that a worker starts with; rarely wanted
+
     meetings: dict[tuple[str, ...], list[Constraint]] = {}
     links = nx.Graph()
     for c in site.constraints.values():
