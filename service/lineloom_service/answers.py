@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import Annotated
 
-from fastapi import Query, Response
+from fastapi import Header, Query, Response
 from fastapi.params import Query as QueryInfo
 from pydantic import BaseModel
 
 from lineloom_service.errors import UNKNOWN_FORMAT, ProblemError
 
 JSON = "application/json"
+
+IfNoneMatch = Annotated[str | None, Header(description="`ETag` of the copy that is there.")]
 
 
 def answer(

@@ -72,6 +72,11 @@ class FramedView:
     view: SiteView
     frames: Mapping[str, Pose] = field(default_factory=dict)
 
+    @property
+    def key(self) -> tuple[tuple[str, Pose], ...]:
+        """What tells it from the same view in other frames."""
+        return tuple(sorted(self.frames.items(), key=lambda item: item[0]))
+
 
 async def render_map(
     service: Service,
@@ -87,7 +92,7 @@ async def render_map(
         return await _nav2(service, site, shown, component, box, resolution)
     if resolution is not None:
         raise ProblemError(INVALID_PARAMETER, "resolution: only a nav2 map has one")
-    form = (format, component, box, tuple(sorted(shown.frames.items(), key=lambda item: item[0])))
+    form = (format, component, box, shown.key)
     return await service.maps.other(
         site, shown.view, form, lambda: _RENDER[format](site.name, shown.view, component, box)
     )

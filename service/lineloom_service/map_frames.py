@@ -12,6 +12,7 @@ from lineloom_core.geometry import Pose
 from lineloom_core.io.reframe import in_frames, only
 from lineloom_core.mapping.site_view import SiteView
 
+from lineloom_service import __version__
 from lineloom_service.errors import (
     INVALID_PARAMETER,
     NO_FLOOR_PLAN,
@@ -29,6 +30,20 @@ AlignQuery = Annotated[
 FrameQuery = Annotated[
     MapFrame, Query(description="In the map's own coordinates, or the floor plan's.")
 ]
+
+
+async def versioned(
+    service: Service, site: SiteRecord, view: SiteView, frame: MapFrame = "map"
+) -> dict[str, str]:
+    """Return the headers of an answer made of nothing but a view.
+
+    The ETag names what it is a function of; in the plan's frame, the plan is part of that.
+    """
+    etag = f"{site.id}-{view.version}-{__version__}"
+    if frame == "plan":
+        plan = await service.floorplans.plan(site)
+        etag += "-none" if plan is None else f"-{plan.sha256[:16]}"
+    return {"ETag": f'"{etag}"', "Cache-Control": "no-cache"}
 
 
 async def in_frame(

@@ -43,6 +43,11 @@ PROBLEM_ANSWER: dict[int | str, dict[str, Any]] = {
 }
 
 
+NOT_MODIFIED: dict[int | str, dict[str, Any]] = {
+    304: {"description": "The copy that If-None-Match names is current."},
+}
+
+
 def body_of(*models: str) -> dict[str, Any]:
     """Return the description of a body that is one of these models."""
     references = [{"$ref": _SCHEMAS + model} for model in models]

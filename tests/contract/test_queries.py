@@ -197,19 +197,20 @@ async def test_a_component_that_was_merged_points_to_its_survivor(
     await _expect_refusal(client, f"{SITE}/map", 404, "unknown-component", component="c77")
 
 
-async def test_a_map_that_did_not_change_is_304(
-    client: httpx.AsyncClient, make_scan: Make, idle: Idle
+@pytest.mark.parametrize("what", ["map", "graph", "graph?format=g2o", "constraints?kind=loop"])
+async def test_what_did_not_change_is_304(
+    client: httpx.AsyncClient, make_scan: Make, idle: Idle, site: str, what: str
 ) -> None:
-    await client.post("/v1/sites/cached/robots/r/scans", json=make_scan(0))
-    await idle("cached")
-    url = "/v1/sites/cached/map"
+    await client.post(f"/v1/sites/{site}/robots/r/scans", json=make_scan(0))
+    await idle(site)
+    url = f"/v1/sites/{site}/{what}"
     etag = (await client.get(url)).headers["etag"]
     for current in (etag, f'"other", W/{etag}', "*"):
         response = await client.get(url, headers={"If-None-Match": current})
         assert (response.status_code, response.content) == (304, b"")
         assert response.headers["etag"] == etag
-    await client.post("/v1/sites/cached/robots/r/scans", json=make_scan(1))
-    await idle("cached")
+    await client.post(f"/v1/sites/{site}/robots/r/scans", json=make_scan(1))
+    await idle(site)
     response = await client.get(url, headers={"If-None-Match": etag})
     assert response.status_code == 200
     assert response.headers["etag"] != etag

@@ -1,4 +1,4 @@
-"""The maps of all sites, ready to be sent."""
+"""The maps of all sites, and what else is made of their views, ready to be sent."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class MapStore:
         form: tuple[object, ...],
         render: Callable[[], str | bytes],
     ) -> bytes:
-        """Return the map as `render` makes it; `form` names all that tells it from others."""
+        """Return what `render` makes of the view; `form` names all that tells it from others."""
         return await self._cache.get((site.id, view.version, *form), render)
 
     def forget_site(self, site_id: int) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
@@ -13,13 +14,21 @@ from lineloom_core.io.svg import to_svg
 from lineloom_core.mapping.answers import Evidence, WhatIf
 from lineloom_core.mapping.site_view import ConstraintView, SiteView
 
-from lineloom_service.answers import answer, format_choice, unknown_format
+from lineloom_service.answers import (
+    JSON,
+    IfNoneMatch,
+    answer,
+    format_choice,
+    matches,
+    unknown_format,
+)
 from lineloom_service.asking import ask
 from lineloom_service.convert import to_constraint
 from lineloom_service.convert_evidence import to_detail, to_what_if
 from lineloom_service.dependencies import CurrentView, KnownSite, ServiceDep
 from lineloom_service.errors import INVALID_PARAMETER, UNKNOWN_CONSTRAINT, ProblemError
-from lineloom_service.openapi import also_as
+from lineloom_service.map_frames import versioned
+from lineloom_service.openapi import NOT_MODIFIED, also_as
 from lineloom_service.service import Service
 from lineloom_service.store.records import ActionKind, SiteRecord
 
@@ -30,31 +39,32 @@ _FOLLOW_S = 20.0
 router = APIRouter(tags=["graph"])
 
 
-@router.get("/v1/sites/{site}/constraints", response_model=wire.ConstraintPage)
+@router.get(
+    "/v1/sites/{site}/constraints", response_model=wire.ConstraintPage, responses=NOT_MODIFIED
+)
 async def list_constraints(
     site: KnownSite,
     view: CurrentView,
+    service: ServiceDep,
     kind: ConstraintKind | None = None,
     state: ConstraintState | None = None,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
     cursor: Annotated[str | None, Query(description="`next_cursor` of the page before.")] = None,
+    if_none_match: IfNoneMatch = None,
 ) -> Response:
     """Return constraints, a page at a time."""
-    found = [
-        constraint
-        for constraint in _after(view, cursor)
-        if kind in (None, constraint.kind) and state in (None, constraint.state)
-    ]
-    page = found[:limit]
-    robots = _robots(view)
-    return answer(
-        wire.ConstraintPage(
-            site=site.name,
-            version=view.version,
-            constraints=[to_constraint(constraint, robots) for constraint in page],
-            next_cursor=page[-1].id if len(found) > limit else None,
-        )
-    )
+    rest = _after(view, cursor)
+    headers = await versioned(service, site, view)
+    if matches(if_none_match, headers["ETag"]):
+        return Response(status_code=304, headers=headers)
+
+    def render() -> str:
+        found = [c for c in rest if kind in (None, c.kind) and state in (None, c.state)]
+        return _page(site.name, view, found, limit).model_dump_json()
+
+    form = ("constraints", kind, state, limit, cursor)
+    content = await service.maps.other(site, view, form, render)
+    return Response(content, headers=headers, media_type=JSON)
 
 
 @router.get(
@@ -154,6 +164,18 @@ def _after(view: SiteView, cursor: str | None) -> tuple[ConstraintView, ...]:
         if constraint.id == cursor:
             return view.constraints[index + 1 :]
     raise ProblemError(INVALID_PARAMETER, "query parameter 'cursor': names no page (any more)")
+
+
+def _page(
+    site: str, view: SiteView, found: Sequence[ConstraintView], limit: int
+) -> wire.ConstraintPage:
+    page, robots = found[:limit], _robots(view)
+    return wire.ConstraintPage(
+        site=site,
+        version=view.version,
+        constraints=[to_constraint(constraint, robots) for constraint in page],
+        next_cursor=page[-1].id if len(found) > limit else None,
+    )
 
 
 def _robots(view: SiteView) -> dict[int, str]:

@@ -6,21 +6,23 @@ import json
 from typing import Annotated
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Header, Query, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from lineloom import wire
 from lineloom.wire.base import MAX_COUNTER
-from lineloom.wire.export import MapFrame
 from lineloom_core.mapping.site_view import SiteView
 
-from lineloom_service import __version__
-from lineloom_service.answers import JSON, format_choice, matches, unknown_format
+from lineloom_service.answers import (
+    JSON,
+    IfNoneMatch,
+    format_choice,
+    matches,
+    unknown_format,
+)
 from lineloom_service.dependencies import CurrentView, KnownSite, ServiceDep
 from lineloom_service.errors import INVALID_PARAMETER, UNKNOWN_COMPONENT, ProblemError
 from lineloom_service.map_files import FORMATS, read_bbox, render_map
-from lineloom_service.map_frames import AlignQuery, FrameQuery, in_frame
-from lineloom_service.openapi import also_as
-from lineloom_service.service import Service
-from lineloom_service.store.records import SiteRecord
+from lineloom_service.map_frames import AlignQuery, FrameQuery, in_frame, versioned
+from lineloom_service.openapi import NOT_MODIFIED, also_as
 
 router = APIRouter(tags=["map"])
 
@@ -30,7 +32,7 @@ router = APIRouter(tags=["map"])
     response_model=wire.MapAnswer,
     responses={
         **also_as(*(format.media_type for name, format in FORMATS.items() if name != "json")),
-        304: {"description": "The copy that If-None-Match names is current."},
+        **NOT_MODIFIED,
         307: {"description": "The component was merged; Location is the survivor's map."},
     },
 )
@@ -51,7 +53,7 @@ async def get_map(
         int | None,
         Query(ge=0, le=MAX_COUNTER, description="A `version`: only what has changed after it."),
     ] = None,
-    if_none_match: Annotated[str | None, Header()] = None,
+    if_none_match: IfNoneMatch = None,
 ) -> Response:
     """Return the map: `format` is json, geojson, svg, png, dxf, csv, ieee1873 or nav2.
 
@@ -68,9 +70,8 @@ async def get_map(
     box = read_bbox(bbox)
     if component is not None and all(c.id != component for c in view.components):
         return _elsewhere(request, view, component)
-    etag = await _etag(service, site, view, frame)
-    headers = {"ETag": etag, "Cache-Control": "no-cache"}
-    if matches(if_none_match, etag):
+    headers = await versioned(service, site, view, frame)
+    if matches(if_none_match, headers["ETag"]):
         return Response(status_code=304, headers=headers)
     if plain:
         content = await service.maps.json(site, view, component, box, since)
@@ -78,15 +79,6 @@ async def get_map(
         shown = await in_frame(service, site, view, align=align, frame=frame, component=component)
         content = await render_map(service, site, shown, format, component, box, resolution)
     return Response(content, headers=headers, media_type=FORMATS[format].media_type)
-
-
-async def _etag(service: Service, site: SiteRecord, view: SiteView, frame: MapFrame) -> str:
-    """Name what the answer is a function of; in the plan's frame, the plan is part of it."""
-    if frame == "map":
-        return f'"{site.id}-{view.version}-{__version__}"'
-    plan = await service.floorplans.plan(site)
-    drawn = "none" if plan is None else plan.sha256[:16]
-    return f'"{site.id}-{view.version}-{__version__}-{drawn}"'
 
 
 def _elsewhere(request: Request, view: SiteView, component: str) -> Response:
