@@ -1,9 +1,10 @@
-"""Views travel in parts: whole at the other end, and only what changed is sent and made anew."""
+"""Views travel in parts: whole at the other end, and only what changed is made anew there."""
 
 from __future__ import annotations
 
 import asyncio
 import pickle
+import zlib
 from dataclasses import fields, replace
 from itertools import islice
 
@@ -11,8 +12,12 @@ import pytest
 from lineloom_core.mapping.site_mapper import SiteMapper
 from lineloom_core.mapping.site_view import SiteView
 from lineloom_core.simulation import Fleet
+from lineloom_service.engine import view_parts
 from lineloom_service.engine.local_engine import LocalEngine
-from lineloom_service.engine.view_parts import ViewDecoder, ViewEncoder
+from lineloom_service.engine.published import EMPTY_VIEW, Published
+from lineloom_service.engine.view_parts import COLLECTIONS, ViewDecoder, ViewEncoder
+from lineloom_service.engine.view_record import ViewReader, write_view
+from lineloom_service.store.records import Skip, ViewRecord
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +69,7 @@ def test_what_has_not_changed_is_not_sent_again_and_stays_the_same_object(
     assert second.lines[1] == moved
     assert all(
         one is other
-        for name in ("lines", "keyframes", "constraints", "submaps")
+        for name in COLLECTIONS
         for one, other in zip(getattr(first, name), getattr(second, name), strict=True)
         if other is not second.lines[1]
     )
@@ -78,6 +83,63 @@ def test_what_is_gone_is_kept_at_neither_end(views: tuple[SiteView, SiteView]) -
     again = encoder.encode(views[0])
     assert len(again.new) == sum(len(numbers) for numbers in again.numbers.values())
     assert _written(decoder.decode(again)) == _written(views[0])
+
+
+def test_every_stored_view_is_read_whole(views: tuple[SiteView, SiteView]) -> None:
+    reader = ViewReader()
+    skip = Skip(7, "r", "scan", "0", 6, "it was cursed")
+    before, after = views
+    shrunk = replace(after, lines=after.lines[::-2], constraints=())
+    for position, view in enumerate((before, after, shrunk, before, EMPTY_VIEW)):
+        published = Published(position, 5, 1, view, (skip,))
+        read = reader.read(write_view(published))
+        assert _written(read.view) == _written(view)
+        assert replace(read, view=view) == published
+
+
+def test_what_a_stored_view_has_of_the_one_before_stays_the_same_object(
+    views: tuple[SiteView, SiteView],
+) -> None:
+    reader = ViewReader()
+    first = reader.read(write_view(Published(1, 1, 0, views[0]))).view
+    moved = replace(views[0].lines[1], x1=99.0)
+    lines = (views[0].lines[0], moved, *views[0].lines[2:])
+    second = reader.read(write_view(Published(2, 2, 0, replace(views[0], lines=lines)))).view
+    assert second.lines[1] == moved
+    assert all(
+        one is other
+        for name in COLLECTIONS
+        for one, other in zip(getattr(first, name), getattr(second, name), strict=True)
+        if other is not second.lines[1]
+    )
+    reader.read(write_view(Published(3, 3, 0, EMPTY_VIEW)))
+    assert reader._known == {}
+
+
+def test_others_get_the_interpreter_between_the_parts_of_a_stored_view(
+    views: tuple[SiteView, SiteView], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    breaths: list[float] = []
+    monkeypatch.setattr(view_parts, "_SPELL_S", 0.0)  # as if every part took that long
+    monkeypatch.setattr("time.sleep", breaths.append)
+    parts = sum(len(getattr(views[0], name)) for name in COLLECTIONS)
+    record = write_view(Published(1, 1, 0, views[0]))
+    assert len(breaths) == parts > 0
+    ViewReader().read(record)
+    assert len(breaths) == 2 * parts
+
+
+def test_a_stored_view_of_other_code_is_told_and_leaves_the_reader_as_it_was(
+    views: tuple[SiteView, SiteView],
+) -> None:
+    reader = ViewReader()
+    published = Published(1, 1, 0, views[0])
+    first = reader.read(write_view(published)).view
+    for data in (b"rubbish", zlib.compress(pickle.dumps(published))):
+        with pytest.raises(ValueError, match="unreadable view"):
+            reader.read(ViewRecord(2, data))
+    again = reader.read(write_view(published)).view
+    assert all(one is other for one, other in zip(first.lines, again.lines, strict=True))
 
 
 async def test_of_a_site_that_is_stopped_nothing_is_kept() -> None:

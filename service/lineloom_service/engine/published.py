@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import pickle
-import zlib
 from dataclasses import dataclass
 
 from lineloom_core.mapping.site_view import SiteView
 
-from lineloom_service.store.records import Skip, ViewRecord
+from lineloom_service.store.records import Skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,10 +23,6 @@ class Published:
     view: SiteView
     skips: tuple[Skip, ...] = ()
 
-    def record(self) -> ViewRecord:
-        """Return this for the store. Takes time with the map's size."""
-        return ViewRecord(self.position, zlib.compress(pickle.dumps(self, protocol=5), 1))
-
 
 EMPTY_VIEW = SiteView(
     version=0,
@@ -42,14 +36,3 @@ EMPTY_VIEW = SiteView(
 )
 NOTHING = Published(0, 0, 0, EMPTY_VIEW)
 """What is known of a site before its first view."""
-
-
-def from_record(record: ViewRecord) -> Published:
-    """Return what was stored. Raises ValueError where other code wrote it and it does not fit."""
-    try:
-        published = pickle.loads(zlib.decompress(record.data))
-    except Exception as error:
-        raise ValueError(f"unreadable view: {error}") from error
-    if not isinstance(published, Published):
-        raise ValueError("unreadable view: it is something else")
-    return published

@@ -6,7 +6,8 @@ import asyncio
 import logging
 import time
 
-from lineloom_service.engine.published import Published, from_record
+from lineloom_service.engine.published import Published
+from lineloom_service.engine.view_record import ViewReader, write_view
 from lineloom_service.store.protocol import Store
 from lineloom_service.store.records import StoreError
 
@@ -24,6 +25,7 @@ class SharedViews:
     def __init__(self, store: Store) -> None:
         self._store = store
         self._views: dict[int, Published] = {}
+        self._readers: dict[int, ViewReader] = {}
         self._to_save: dict[int, Published] = {}
         self._wanted: set[int] = set()
         self._tasks: dict[tuple[str, int], asyncio.Task[None]] = {}
@@ -53,6 +55,7 @@ class SharedViews:
             if task is not None:
                 task.cancel()
         self._views.pop(site_id, None)
+        self._readers.pop(site_id, None)
         self._to_save.pop(site_id, None)
         self._wanted.discard(site_id)
 
@@ -64,7 +67,8 @@ class SharedViews:
         await asyncio.gather(*tasks, return_exceptions=True)
         for site_id, published in list(self._to_save.items()):
             try:
-                await self._store.save_view(site_id, published.record())
+                record = await asyncio.to_thread(write_view, published)
+                await self._store.save_view(site_id, record)
             except StoreError:
                 _LOG.warning("the last view of site %d is not shared", site_id)
         self._to_save.clear()
@@ -79,7 +83,7 @@ class SharedViews:
         while (published := self._to_save.pop(site_id, None)) is not None:
             begin = time.monotonic()
             try:
-                record = await asyncio.to_thread(published.record)
+                record = await asyncio.to_thread(write_view, published)
                 await self._store.save_view(site_id, record)
             except StoreError as error:
                 _LOG.warning("site %d: a view is not shared: %s", site_id, error)
@@ -98,7 +102,8 @@ class SharedViews:
             try:
                 record = await self._store.view(site_id, -1 if known is None else known.position)
                 if record is not None:
-                    self._views[site_id] = await asyncio.to_thread(from_record, record)
+                    reader = self._readers.setdefault(site_id, ViewReader())
+                    self._views[site_id] = await asyncio.to_thread(reader.read, record)
             except StoreError:
                 self._wanted.add(site_id)
                 await asyncio.sleep(_AGAIN_S)

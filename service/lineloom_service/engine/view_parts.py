@@ -10,18 +10,34 @@ from __future__ import annotations
 
 import pickle
 import time
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from itertools import islice
+from typing import TypeVar
 
 from lineloom_core.mapping.site_view import SiteView
 
-_COLLECTIONS = ("lines", "keyframes", "constraints", "submaps")
+T = TypeVar("T")
+
+COLLECTIONS = ("lines", "keyframes", "constraints", "submaps")
 """The fields that grow with the map and are tuples of many objects."""
 
-_AT_A_TIME = 100
-"""Objects read before others get the interpreter: about half a millisecond."""
+_SPELL_S, _BREATH_S = 0.0005, 0.0005
+"""So long objects are read before others get the interpreter, and so long they have it."""
 
-_BREATH_S = 0.0005
+
+def with_breaths(parts: Iterable[T]) -> Iterator[T]:
+    """Let others have the interpreter now and then, for work of many small steps on a thread."""
+    begin = time.perf_counter()
+    for part in parts:
+        yield part
+        if time.perf_counter() - begin >= _SPELL_S:
+            time.sleep(_BREATH_S)
+            begin = time.perf_counter()
+
+
+def without_collections(view: SiteView) -> SiteView:
+    """Return what does not grow part by part."""
+    return replace(view, lines=(), keyframes=(), constraints=(), submaps=())
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +65,7 @@ class ViewEncoder:
         sent: dict[bytes, int] = {}
         numbers: dict[str, list[int]] = {}
         new: dict[int, bytes] = {}
-        for name in _COLLECTIONS:
+        for name in COLLECTIONS:
             numbers[name] = []
             for part in getattr(view, name):
                 body = pickle.dumps(part, protocol=5)
@@ -60,8 +76,8 @@ class ViewEncoder:
                 sent[body] = number
                 numbers[name].append(number)
         self._sent = sent
-        rest = replace(view, lines=(), keyframes=(), constraints=(), submaps=())
-        return ViewParts(pickle.dumps(rest, protocol=5), numbers, new)
+        rest = pickle.dumps(without_collections(view), protocol=5)
+        return ViewParts(rest, numbers, new)
 
 
 class ViewDecoder:
@@ -72,18 +88,11 @@ class ViewDecoder:
 
     def decode(self, encoded: ViewParts) -> SiteView:
         """Return the view; its parts that were in the one before are the same objects."""
-        known = self._parts | self._read(encoded.new)
+        read = {number: pickle.loads(new) for number, new in with_breaths(encoded.new.items())}
+        known = self._parts | read
         self._parts = {n: known[n] for numbers in encoded.numbers.values() for n in numbers}
         rest: SiteView = pickle.loads(encoded.rest)
         collections = {
             name: tuple(known[n] for n in numbers) for name, numbers in encoded.numbers.items()
         }
         return replace(rest, **collections)  # type: ignore[arg-type]
-
-    def _read(self, new: dict[int, bytes]) -> dict[int, object]:
-        read: dict[int, object] = {}
-        bodies = iter(new.items())
-        while some := list(islice(bodies, _AT_A_TIME)):
-            read.update((number, pickle.loads(body)) for number, body in some)
-            time.sleep(_BREATH_S)
-        return read
