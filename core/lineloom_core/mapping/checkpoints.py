@@ -8,13 +8,11 @@ of the history. A cache: without any of them all comes out the same, later.
 
 from __future__ import annotations
 
-import io
-import pickle
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
+from lineloom_core.mapping.by_reference import dumps, loads
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.history import History
 from lineloom_core.mapping.keyframe import Keyframe
@@ -72,20 +70,17 @@ class Checkpoints:
         self._kept = [c for c in self._kept if c.next_keyframe <= affected]
         if not self._kept:
             site = SiteMap(self._config, self._memory, verdicts)
-            return site, iter(self.history.keyframes.values())
+            return site, self.history.since(0)
         begin = self._kept[-1].next_keyframe
         site = self._from_bytes(self._kept[-1].data)
         site.verdicts = verdicts
-        return site, (f for k, f in self.history.keyframes.items() if k >= begin)
+        return site, self.history.since(begin)
 
     def _as_bytes(self, site: SiteMap) -> bytes:
-        out = io.BytesIO()
-        _Writer(out, self.history, self._memory, self._config).dump(site)
-        return zlib.compress(out.getbuffer(), 1)
+        return zlib.compress(dumps(site, self.history, self._memory, self._config), 1)
 
     def _from_bytes(self, data: bytes) -> SiteMap:
-        file = io.BytesIO(zlib.decompress(data))
-        site = _Reader(file, self.history, self._memory, self._config).load()
+        site = loads(zlib.decompress(data), self.history, self._memory, self._config)
         assert isinstance(site, SiteMap)
         return site
 
@@ -96,32 +91,3 @@ def _stays(number: int, age: int) -> bool:
     while age >= share * _THINNER:
         share *= _THINNER
     return number % share == 0
-
-
-class _Writer(pickle.Pickler):
-    """Leaves out what the history and the memory hold anyway."""
-
-    def __init__(
-        self, file: io.BytesIO, history: History, memory: Memory, config: MapperConfig
-    ) -> None:
-        super().__init__(file, protocol=5)
-        self._keyframes, self._named = (
-            history.keyframes,
-            {id(memory): "memory", id(config): "config"},
-        )
-
-    def persistent_id(self, obj: Any) -> str | int | None:
-        if isinstance(obj, Keyframe):
-            return obj.id if self._keyframes.get(obj.id) is obj else None
-        return self._named.get(id(obj))
-
-
-class _Reader(pickle.Unpickler):
-    def __init__(
-        self, file: io.BytesIO, history: History, memory: Memory, config: MapperConfig
-    ) -> None:
-        super().__init__(file)
-        self._keyframes, self._named = history.keyframes, {"memory": memory, "config": config}
-
-    def persistent_load(self, pid: Any) -> Any:
-        return self._named[pid] if isinstance(pid, str) else self._keyframes[pid]

@@ -133,5 +133,7 @@ class MapperConfig:
     persistence: PersistenceConfig = field(default_factory=PersistenceConfig)
     checkpoint_every: int = 256
     """Keyframes at least from one `Checkpoints` to the next."""
+    chapter: int = 256
+    """Keyframes in a chapter of the `History`."""
     least_fit_late: float = 0.6
     """Share of a late scan that must lie on its neighbours' surfaces."""

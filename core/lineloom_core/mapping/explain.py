@@ -55,7 +55,7 @@ def _seen_by(site: SiteMap, history: History, place: int, keyframe: int) -> tupl
     known = site.places.get(place)
     if known is not None and keyframe in known.keyframes:
         return known, known.poses[known.keyframes.index(keyframe)].inverse()
-    return make_place((keyframe,), history.keyframes), Pose.identity()
+    return make_place((keyframe,), history), Pose.identity()
 
 
 def _moved(T: Pose, place: Place) -> NDArray[np.float64]:

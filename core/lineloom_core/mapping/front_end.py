@@ -88,7 +88,7 @@ def _distrust(history: History, record: RobotRecord, taken: Taken) -> Taken:
         return taken
     record.distrusted = errors[0]
     history.distrust(record.name, taken.keyframe.scan.session)
-    return replace(taken, keyframe=history.keyframes[taken.keyframe.id], distrusted=True)
+    return replace(taken, keyframe=history[taken.keyframe.id], distrusted=True)
 
 
 def _is_late(record: RobotRecord, scan: Scan) -> bool:
@@ -145,7 +145,7 @@ def _place(
     if record.track is None:
         record.track = history.new_track()
     if not tracked.is_keyframe and record.last_keyframe is not None:
-        last = history.keyframes[record.last_keyframe]
+        last = history[record.last_keyframe]
         _remember(record, scan, last.id, last.T_track_laser.between(tracked.pose))
         return Taken(placed=True)
     keyframe = Keyframe(
@@ -169,7 +169,7 @@ def _step(history: History, record: RobotRecord, tracked: Tracked) -> Step | Non
     if record.last_keyframe is None:
         return None
     assert tracked.pose is not None
-    last = history.keyframes[record.last_keyframe]
+    last = history[record.last_keyframe]
     return Step(
         previous=last.id,
         T_previous_this=last.T_track_laser.between(tracked.pose),
@@ -189,13 +189,8 @@ def _back_fill(
     config: MapperConfig, history: History, record: RobotRecord, scan: Scan, cloud: Cloud
 ) -> Taken:
     """Place a late scan against the keyframes around its sequence number; track nothing."""
-    near = [
-        k
-        for k in history.keyframes.values()
-        if k.robot == record.name and k.scan.session == scan.session
-    ]
-    if near and len(cloud.points):
-        anchor = min(near, key=lambda k: (abs(k.scan.seq - scan.seq), k.id))
+    anchor = history.nearest(record.name, scan.session, scan.seq)
+    if anchor is not None and len(cloud.points):
         surroundings = LocalMap.build(
             (f.cloud, anchor.T_track_laser.between(f.T_track_laser))
             for f in history.around(anchor, _AROUND)

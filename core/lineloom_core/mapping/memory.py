@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +22,27 @@ from lineloom_core.places import (
 Pair = tuple[int, int]
 _T = TypeVar("_T")
 
+_TABLES_KEPT = 20_000
+"""Pairs of places of which all hypotheses are kept, about 0.3 kB each."""
+
+
+class Sealed(Protocol):
+    """Where recognitions are when the history that they are of is sealed (`History`)."""
+
+    def recognitions(self, place: int) -> dict[Pair, Recognition]:
+        """Those that were asked for when the place was the latest."""
+
 
 class Memory:
-    """Places by id, and what came of comparing two of them. A cache: it decides nothing."""
+    """Places by id, and what came of comparing two of them. A cache: it decides nothing.
 
-    def __init__(self, config: RecognitionConfig) -> None:
+    Of places that the map has let go nothing is held here: who replays finds recognitions in the
+    history, and makes the places anew.
+    """
+
+    def __init__(self, config: RecognitionConfig, sealed: Sealed | None = None) -> None:
         self._config = config
+        self.sealed = sealed
         self.places: dict[int, Place] = {}
         self.index = PlaceIndex()
         self._recognitions: dict[Pair, Recognition] = {}
@@ -36,20 +51,30 @@ class Memory:
 
     def __getstate__(self) -> dict[str, Any]:
         """Recognitions are worth keeping; places and hypotheses are had again as needed."""
-        return {**self.__dict__, "places": {}, "_hypotheses": {}, "_look_alikes": {}}
+        empty: dict[str, Any] = {
+            "sealed": None,
+            "places": {},
+            "_hypotheses": {},
+            "_look_alikes": {},
+        }
+        return {**self.__dict__, **empty}
 
     def recognise(self, reference: Place, current: Place) -> Recognition:
         """`places.recognise`, asked once per pair."""
         pair = (reference.id, current.id)
-        if pair not in self._recognitions:
-            self._recognitions[pair] = recognise(reference, current, self._config)
-        return self._recognitions[pair]
+        found = self._recognitions.get(pair)
+        if found is None and self.sealed is not None:
+            found = self.sealed.recognitions(max(pair)).get(pair)
+        if found is None:
+            found = self._recognitions[pair] = recognise(reference, current, self._config)
+        return found
 
     def hypotheses(self, reference: Place, current: Place) -> NDArray[np.float64]:
         """`places.hypotheses`, asked once per pair."""
         pair = (reference.id, current.id)
         if pair not in self._hypotheses:
-            self._hypotheses[pair] = hypotheses(reference, current, self._config)
+            table = hypotheses(reference, current, self._config)
+            _keep(self._hypotheses, pair, table)
         return self._hypotheses[pair]
 
     def look_alikes(self, reference: Place, current: Place) -> NDArray[np.float64]:
@@ -64,8 +89,23 @@ class Memory:
                 missing_share(*count_steady(reference, current, Pose.from_array(row[:3])))
                 for row in table
             ]
-            self._look_alikes[pair] = table[np.array(missing) <= self._config.most_missing]
+            alike = table[np.array(missing) <= self._config.most_missing]
+            _keep(self._look_alikes, pair, alike)
         return self._look_alikes[pair]
+
+    def let_go(self, place: int) -> None:
+        """The map has let a place go."""
+        self.places.pop(place, None)
+        self.index.forget(place)
+
+    def hand_over(self, begin: int, end: int) -> dict[Pair, Recognition]:
+        """Return the recognitions of places with ids up to `end`, to be held elsewhere from now on.
+
+        What is older than `begin` was asked for anew since it was handed over: dropped.
+        """
+        over = {p: r for p, r in self._recognitions.items() if begin <= max(p) < end}
+        self._recognitions = {p: r for p, r in self._recognitions.items() if max(p) >= end}
+        return over
 
     def forget(self, keyframes: set[int]) -> None:
         """Drop what rests on keyframes that are gone; a place is named by its last one."""
@@ -74,6 +114,13 @@ class Memory:
         self._recognitions = _kept(self._recognitions, keyframes)
         self._hypotheses = _kept(self._hypotheses, keyframes)
         self._look_alikes = _kept(self._look_alikes, keyframes)
+
+
+def _keep(items: dict[Pair, _T], pair: Pair, item: _T) -> None:
+    """Remember an item; of too many the oldest goes."""
+    items[pair] = item
+    if len(items) > _TABLES_KEPT:
+        del items[next(iter(items))]
 
 
 def _kept(items: dict[Pair, _T], gone: set[int]) -> dict[Pair, _T]:

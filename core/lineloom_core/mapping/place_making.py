@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from typing import Protocol
 
 from lineloom_core.mapping.config import PlaceConfig
 from lineloom_core.mapping.keyframe import Keyframe
 from lineloom_core.mapping.track import Track
 from lineloom_core.places import Glimpse, Place
+
+
+class Keyframes(Protocol):
+    """Keyframes by id: those of the map, or the history."""
+
+    def __getitem__(self, keyframe: int, /) -> Keyframe:
+        """The keyframe of this id."""
 
 
 def place_is_due(track: Track, config: PlaceConfig) -> bool:
@@ -26,7 +34,7 @@ def recent_keyframes(track: Track, config: PlaceConfig) -> list[int]:
     return members
 
 
-def make_place(members: Sequence[int], keyframes: Mapping[int, Keyframe]) -> Place:
+def make_place(members: Sequence[int], keyframes: Keyframes) -> Place:
     """The place that consecutive keyframes of one track show, anchored at the middle one.
 
     A function of the keyframes alone, so that a snapshot need not hold places. Its id is that of

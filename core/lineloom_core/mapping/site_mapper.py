@@ -17,7 +17,8 @@ from collections.abc import Sequence
 
 from lineloom_core.fusion.occupancy import Rays
 from lineloom_core.mapping.advance import advance
-from lineloom_core.mapping.answers import Action, Evidence, WhatIf
+from lineloom_core.mapping.answers import Action, Evidence, Trajectory, WhatIf
+from lineloom_core.mapping.by_reference import dumps, loads
 from lineloom_core.mapping.changes import Changes
 from lineloom_core.mapping.checkpoints import Checkpoints
 from lineloom_core.mapping.config import MapperConfig
@@ -36,11 +37,11 @@ from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.mapping.site_view import SiteView
 from lineloom_core.mapping.snapshot import Snapshot, SnapshotError
 from lineloom_core.mapping.verdicts import Verdicts
-from lineloom_core.mapping.view_builder import build_view
+from lineloom_core.mapping.view_builder import build_view, trajectory_of
 from lineloom_core.mapping.what_if import what_if
 from lineloom_core.scan import Mount, Scan
 
-SNAPSHOT_FORMAT = 9
+SNAPSHOT_FORMAT = 10
 
 
 class SiteMapper:
@@ -53,9 +54,9 @@ class SiteMapper:
         self, config: MapperConfig | None = None, *, verdicts: Verdicts | None = None
     ) -> None:
         self._config = config or MapperConfig()
-        self._memory = Memory(self._config.recognition)
+        self._history = History(self._config.chapter)
+        self._memory = Memory(self._config.recognition, self._history)
         self._site = SiteMap(self._config, self._memory, verdicts)
-        self._history = History()
         self._checkpoints = Checkpoints(self._config, self._history, self._memory)
         self._robots: dict[str, RobotRecord] = {}
         self._version = 0
@@ -82,17 +83,24 @@ class SiteMapper:
         taken = take(self._config, self._history, record, scan, self._version)
         if taken.keyframe is None:
             return Changes(placed=taken.placed)
-        if taken.distrusted:
-            return self._set_apart(robot, taken.keyframe)
-        became = advance(self._site, taken.keyframe)
+        changes = (
+            self._set_apart(robot, taken.keyframe)
+            if taken.distrusted
+            else self._advance(taken.keyframe, started=taken.started)
+        )
+        self._history.seal(self._memory)
+        return changes
+
+    def _advance(self, keyframe: Keyframe, *, started: bool) -> Changes:
+        became = advance(self._site, keyframe)
         if became.contradicted:
             self._rebuild(self._site.verdicts.withdraw(became.contradicted))
         else:
-            self._checkpoints.note(self._site, taken.keyframe.id)
+            self._checkpoints.note(self._site, keyframe.id)
         return Changes(
             placed=True,
-            started_component=f"c{taken.keyframe.track}" if taken.started else None,
-            keyframe=taken.keyframe.id,
+            started_component=f"c{keyframe.track}" if started else None,
+            keyframe=keyframe.id,
             merges=became.merges,
             withdrawn=tuple(c.id for c in became.contradicted),
             optimised=became.optimised or bool(became.contradicted),
@@ -112,7 +120,7 @@ class SiteMapper:
         self._version += 1
         if self._robots.pop(robot, None) is None:
             return
-        gone = {k for k, f in self._history.keyframes.items() if f.robot == robot}
+        gone = set(self._history.of(robot))
         self._history.forget(robot)
         self._memory.forget(gone)
         self._rebuild(self._site.verdicts.without(gone).operators_only(), min(gone, default=None))
@@ -164,41 +172,49 @@ class SiteMapper:
         """Return what the lidars saw as free, for an occupancy grid; changes nothing."""
         return component_rays(self._site, component)
 
-    def view(self) -> SiteView:
-        """Everything there is to know at this version; changes nothing."""
-        return build_view(self._site, self._robots, self._version)
+    def view(self, *, trajectories: bool = True) -> SiteView:
+        """Everything there is to know at this version; changes nothing.
+
+        Without trajectories it costs in proportion to the map, with them to all scans ever taken.
+        """
+        return build_view(self._site, self._robots, self._version, trajectories=trajectories)
+
+    def trajectory(self, robot: str) -> Trajectory:
+        """Every scan of a robot with its pose, none of one that is not known; changes nothing."""
+        record = self._robots.get(robot, RobotRecord(robot))
+        return Trajectory(self._version, trajectory_of(self._site, record))
 
     def snapshot(self, known: int = 0) -> Snapshot:
         """The whole state, for `restore`, without the first `known` chapters of the history."""
-        state = (
-            SNAPSHOT_FORMAT,
-            self._config,
-            self._memory,
-            self._history,
-            self._site,
-            self._robots,
-            self._version,
+        beliefs = dumps(
+            (self._site, self._robots, self._version), self._history, self._memory, self._config
         )
-        return Snapshot(pickle.dumps(state, protocol=5), known)
+        state = (SNAPSHOT_FORMAT, self._config, self._history, self._memory, beliefs)
+        return Snapshot(pickle.dumps(state, protocol=5), known, self._history.chapters(known))
 
     @classmethod
     def restore(cls, snapshot: Snapshot) -> SiteMapper:
         """Go on from a whole snapshot. Raises SnapshotError where it cannot be read."""
         try:
-            form, config, memory, history, site, robots, version = pickle.loads(snapshot.state)
+            form, config, history, memory, beliefs = pickle.loads(snapshot.state)
+            if form != SNAPSHOT_FORMAT:
+                raise SnapshotError(f"snapshot of format {form}, expected {SNAPSHOT_FORMAT}")
+            history.bind(snapshot.chapters if snapshot.first == 0 else ())
+            site, robots, version = loads(beliefs, history, memory, config)
+        except SnapshotError:
+            raise
         except Exception as error:
             raise SnapshotError(f"unreadable snapshot: {error}") from error
-        if form != SNAPSHOT_FORMAT:
-            raise SnapshotError(f"snapshot of format {form}, expected {SNAPSHOT_FORMAT}")
+        memory.sealed = history
         mapper = cls(config)
         mapper._memory, mapper._history, mapper._site = memory, history, site
         mapper._robots, mapper._version = robots, version
-        mapper._checkpoints = Checkpoints(mapper._config, history, memory)
+        mapper._checkpoints = Checkpoints(config, history, memory)
         return mapper
 
     def _set_apart(self, robot: str, keyframe: Keyframe) -> Changes:
         """Go through the history again without places of a robot whose lidar is certainly wrong."""
-        frames = self._history.keyframes
+        frames = self._site.keyframes
         tied = {
             c.id
             for c in self._site.constraints.values()
@@ -207,8 +223,7 @@ class SiteMapper:
             and robot in (frames[c.keyframe_a].robot, frames[c.keyframe_b].robot)
         }
         session = keyframe.scan.session
-        first = min(k for k, f in frames.items() if (f.robot, f.scan.session) == (robot, session))
-        self._rebuild(self._site.verdicts, first)
+        self._rebuild(self._site.verdicts, self._history.of(robot, session)[0])
         kept = self._site.constraints
         withdrawn = (i for i in sorted(tied) if i not in kept or kept[i].state != "accepted")
         return Changes(

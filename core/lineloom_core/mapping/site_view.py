@@ -169,6 +169,7 @@ class SiteView:
 
     version: number of log entries processed; grows with every one, so it is the same again after
     a replay. merged_into: component id -> id of the survivor, for components that were absorbed.
+    trajectories: by robot; none in a view that was asked for without: they grow with every scan.
     """
 
     version: int

@@ -31,6 +31,7 @@ def thin(site: SiteMap, place: Place) -> tuple[Place, ...]:
     gone = [p for p in alike[1:] if _may_go(site, p)][:surplus]
     for p in gone:
         del site.places[p.id]
+        site.memory.let_go(p.id)
     if gone:
         site.let_go(_unneeded(site, gone))
         site.tidy()

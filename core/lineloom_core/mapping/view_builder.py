@@ -22,15 +22,17 @@ from lineloom_core.mapping.site_view import (
 )
 
 
-def build_view(site: SiteMap, robots: dict[str, RobotRecord], version: int) -> SiteView:
-    """Compose the view of a version; changes nothing."""
+def build_view(
+    site: SiteMap, robots: dict[str, RobotRecord], version: int, *, trajectories: bool
+) -> SiteView:
+    """Compose the view of a version, with or without trajectories; changes nothing."""
     component_of = {k: site.component_id(k) for k in site.keyframes}
     return SiteView(
         version=version,
         robots={name: _robot(site, record, component_of) for name, record in robots.items()},
         components=_components(site, component_of),
         merged_into=dict(site.merged_into),
-        trajectories={name: _trajectory(site, r, component_of) for name, r in robots.items()},
+        trajectories={n: trajectory_of(site, r) for n, r in robots.items()} if trajectories else {},
         lines=fused_lines(site, component_of),
         keyframes=_keyframes(site, component_of),
         constraints=_constraints(site),
@@ -82,11 +84,12 @@ def _covariance(site: SiteMap, keyframe: int) -> NDArray[np.float64]:
     return in_map_axes(covariances.of(keyframe), site.pose(keyframe))
 
 
-def _trajectory(site: SiteMap, record: RobotRecord, component_of: dict[int, str]) -> TrajectoryView:
+def trajectory_of(site: SiteMap, record: RobotRecord) -> TrajectoryView:
+    """Every scan of a robot with its pose now; takes time with their number."""
     placed = record.placed
     keyframes, of = np.unique(placed.keyframes, return_inverse=True)
     anchors = np.array([site.pose(k).to_array() for k in keyframes.tolist()]).reshape(-1, 3)
-    components = [component_of[site.resting.on(k)[0]] for k in keyframes.tolist()]
+    components = [site.component_id(k) for k in keyframes.tolist()]
     base = record.mount.T_base_laser.inverse().to_array()
     in_map = _compose(anchors[of], placed.steps)
     return TrajectoryView(

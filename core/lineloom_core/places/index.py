@@ -19,6 +19,9 @@ from lineloom_core.places.place import Place
 CORNER_REACH, LEAST_SINE, MOST_CORNERS = 0.6, 0.5, 80
 HALF, CELL, PEAKS, LINE_REACH = 16.0, 0.5, 3, 0.4
 
+_FEW = 64
+"""Places for whose room nobody tidies up."""
+
 
 class PlaceIndex:
     """What places look like, packed in arrays. A cache: it answers by the places alone."""
@@ -27,6 +30,10 @@ class PlaceIndex:
         self._slots: dict[tuple[int, tuple[int, ...]], int] = {}
         self._corners = _Rows(kernels.CORNER_COLUMNS)
         self._lines = _Rows(kernels.LINE_COLUMNS)
+        self._gone: set[int] = set()
+
+    def __len__(self) -> int:
+        return len(self._slots)
 
     def __getstate__(self) -> dict[str, Any]:
         """Had again from the places as needed."""
@@ -38,6 +45,7 @@ class PlaceIndex:
     def add(self, place: Place) -> int:
         """Take a place in unless one of its id and keyframes is known; return its number."""
         name = (place.id, place.keyframes)
+        self._gone.discard(place.id)
         slot = self._slots.get(name)
         if slot is None:
             slot = self._slots[name] = len(self._slots)
@@ -46,6 +54,17 @@ class PlaceIndex:
             )
             self._lines.append(kernels.short_lines(place.lines))
         return slot
+
+    def forget(self, place: int) -> None:
+        """Drop the place of this id; its room is used again once half of all places are gone."""
+        self._gone.add(place)
+        if len(self._gone) <= max(_FEW, len(self._slots) // 2):
+            return
+        kept = [name for name in self._slots if name[0] not in self._gone]
+        slots = [self._slots[name] for name in kept]
+        self._corners, self._lines = self._corners.only(slots), self._lines.only(slots)
+        self._slots = {name: slot for slot, name in enumerate(kept)}
+        self._gone = set()
 
     def likeness(self, place: Place, others: Sequence[Place]) -> NDArray[np.float64]:
         """How many metres of line each of the others can explain of `place`, shape (n,)."""
@@ -85,6 +104,13 @@ class _Rows:
 
     def of(self, piece: int) -> NDArray[np.float64]:
         return self._rows[self._ends[piece] : self._ends[piece + 1]]
+
+    def only(self, pieces: Sequence[int]) -> _Rows:
+        """These pieces by themselves, in this order."""
+        other = _Rows(self._rows.shape[1])
+        for piece in pieces:
+            other.append(self.of(piece))
+        return other
 
     def append(self, piece: NDArray[np.float64]) -> None:
         begin = int(self._ends[self._count])

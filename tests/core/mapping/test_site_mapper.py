@@ -6,10 +6,12 @@ import os
 import pickle
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.site_mapper import SiteMapper
 from lineloom_core.mapping.site_view import SiteView
 from lineloom_core.mapping.snapshot import Snapshot, SnapshotError
@@ -20,6 +22,7 @@ from tests.core.mapping.drives import component_error, empty, feed, fingerprint,
 
 GO_ON = """
 import hashlib, pickle, sys
+from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.site_mapper import SiteMapper
 sys.path.insert(0, sys.argv[1])
 from tests.core.mapping.drives import feed, fingerprint
@@ -76,6 +79,59 @@ def test_going_on_from_a_snapshot_gives_the_same_bits(
     resumed = SiteMapper.restore(snapshot)
     feed(resumed, log[half:])
     assert fingerprint(resumed.view()) == fingerprint(whole)
+
+
+def test_how_long_chapters_are_changes_nothing(log: list[SimulatedScan], whole: SiteView) -> None:
+    mappers = [SiteMapper(MapperConfig(chapter=length)) for length in (8, 10_000)]
+    for mapper in mappers:
+        feed(mapper, log)
+        assert fingerprint(mapper.view()) == fingerprint(whole)
+    met = next(c.id for c in whole.constraints if c.kind == "rendezvous" and c.state == "accepted")
+    for mapper in mappers:
+        mapper.retract(met)
+        mapper.forget("robot-1")
+        mapper.reinstate(met)
+        feed(mapper, log[50:150])  # late, or of a robot that was forgotten
+    short, long = (fingerprint(mapper.view()) for mapper in mappers)
+    assert short == long
+
+
+def test_a_later_snapshot_repeats_no_chapter(log: list[SimulatedScan], whole: SiteView) -> None:
+    half = len(log) // 2
+    mapper = SiteMapper(MapperConfig(chapter=8))
+    feed(mapper, log[:half])
+    first = mapper.snapshot()
+    feed(mapper, log[half:])
+    second = mapper.snapshot(known=first.end)
+    assert 0 < first.end < second.end
+    together = Snapshot(second.state, 0, (*first.chapters, *second.chapters))
+    resumed = SiteMapper.restore(together)
+    assert fingerprint(resumed.view()) == fingerprint(whole)
+    assert resumed.snapshot().chapters == together.chapters
+
+
+def test_a_snapshot_without_its_chapters_is_named(log: list[SimulatedScan]) -> None:
+    mapper = SiteMapper(MapperConfig(chapter=8))
+    feed(mapper, log[:200])
+    whole = mapper.snapshot()
+    for chapters in ((), whole.chapters[:-1], (*whole.chapters[:-1], b"damaged")):
+        with pytest.raises(SnapshotError):
+            SiteMapper.restore(Snapshot(whole.state, 0, chapters))
+    with pytest.raises(SnapshotError):
+        SiteMapper.restore(mapper.snapshot(known=1))
+
+
+def test_trajectories_asked_for_are_those_of_the_view(log: list[SimulatedScan]) -> None:
+    mapper = mapped(log[:150])
+    view, without = mapper.view(), mapper.view(trajectories=False)
+    assert without.trajectories == {}
+    assert fingerprint(replace(view, trajectories={})) == fingerprint(without)
+    assert set(view.trajectories) == {"robot-1", "robot-2"}
+    for name, shown in view.trajectories.items():
+        asked = mapper.trajectory(name)
+        assert asked.version == view.version
+        assert list(asked.scans.rows()) == list(shown.rows())
+    assert list(mapper.trajectory("nobody").scans.rows()) == []
 
 
 def test_a_fresh_process_with_other_hashes_ends_with_the_same_bits(

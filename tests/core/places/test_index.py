@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from lineloom_core.places import Place, PlaceIndex
 from lineloom_core.places import _index_kernels as kernels
+from lineloom_core.places import index as place_index
 from lineloom_core.simulation import sick_lms200
 from numpy.typing import NDArray
 
@@ -89,6 +90,21 @@ def test_the_answer_does_not_depend_on_what_else_is_known(many: list[Stretch]) -
     assert a.tobytes() == pickle.loads(pickle.dumps(full)).likeness(asked, some).tobytes()
     turned_round = full.likeness(asked, some[::-1])
     assert turned_round[::-1].tobytes() == a.tobytes()
+
+
+def test_what_was_forgotten_takes_no_room_and_changes_no_answer(
+    many: list[Stretch], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(place_index, "_FEW", 2)
+    index, places = PlaceIndex(), [s.forth.place for s in many]
+    asked, kept, gone = many[3].again.place, places[9:], places[:9]
+    index.likeness(asked, places)
+    for place in gone:
+        index.forget(place.id)
+    assert len(index) < len(places)
+    assert index.likeness(asked, kept).tobytes() == PlaceIndex().likeness(asked, kept).tobytes()
+    back = index.likeness(asked, places)
+    assert back.tobytes() == PlaceIndex().likeness(asked, places).tobytes()
 
 
 def test_a_shortlist_keeps_the_order_and_all_where_there_are_few(many: list[Stretch]) -> None:
