@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lineloom_core.geometry import Pose
+from lineloom_core.graph.growing import GrowingArray
 
 MEASURED_SHORT = 2.0
 """Real tracks were off by up to 1.4 times what was measured: variances are doubled."""
@@ -60,27 +61,31 @@ class Chain:
     """
 
     def __init__(self) -> None:
-        self._poses: list[Pose] = []
-        self._sums: list[NDArray[np.float64]] = []
+        self._poses = GrowingArray(np.float64, (3,))
+        self._sums = GrowingArray(np.float64, (3, 3))
         self._spread: NDArray[np.float64] = np.zeros(2)
 
     def append(self, step: Pose, covariance: NDArray[np.float64]) -> None:
         """Add T_previous_this with its covariance in the tangent at this; the first is ignored."""
-        if not self._poses:
-            self._poses, self._sums = [Pose.identity()], [np.zeros((3, 3))]
+        if not len(self._poses):
+            self._poses.append(0.0)
+            self._sums.append(0.0)
             return
-        pose = self._poses[-1] @ step
+        pose = self._pose(-1) @ step
         A = pose.adjoint()
-        self._poses.append(pose)
-        self._sums.append(self._sums[-1] + A @ covariance @ A.T)
+        self._poses.append(pose.to_array())
+        self._sums.append(self._sums.rows[-1] + A @ covariance @ A.T)
         self._spread += 0.5 * (covariance[0, 0] + covariance[1, 1]), covariance[2, 2]
 
     def between(self, a: int, b: int) -> NDArray[np.float64]:
         """Covariance (3, 3) of T_a_b, places in the chain, in the tangent at b."""
-        A = self._poses[b].inverse().adjoint()
-        difference = self._sums[b] - self._sums[a]
+        A = self._pose(b).inverse().adjoint()
+        difference = self._sums.rows[b] - self._sums.rows[a]
         covariance: NDArray[np.float64] = A @ (difference if b >= a else -difference) @ A.T
         return covariance
+
+    def _pose(self, position: int) -> Pose:
+        return Pose(*self._poses.rows[position].tolist())
 
     @property
     def spread(self) -> tuple[float, float]:

@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 from lineloom_core.graph import Covariances, GrowingArray, Piece, PoseGraph
 from lineloom_core.mapping.keyframe import Keyframe, Step
 
+_ROOM = 64
+"""Rows that are not worth tidying up."""
+
 
 class GraphDrift:
     """Relative covariances, kept until the graph changes."""
@@ -32,6 +35,7 @@ class GraphDrift:
         """Covariance (3, 3) of T_a_b, two keyframes of one component, in the tangent at b."""
         if self._known_at != self._graph.changes:
             self._known, self._known_at = {}, self._graph.changes
+            self._forget_what_was_let_go()
         root = self._graph.component_root(a)
         if root not in self._known:
             self._known[root] = Covariances(self._as_measured(self._graph.piece(root)), root)
@@ -44,6 +48,10 @@ class GraphDrift:
         information = piece.information.copy()
         information[tracked] = self._steps.rows[rows]
         return replace(piece, information=information)
+
+    def _forget_what_was_let_go(self) -> None:
+        if len(self._steps) > _ROOM + 2 * len(self._keyframes):
+            self._rows, self._steps = {}, GrowingArray(np.float64, (3, 3))
 
     def _row(self, keyframe: int) -> int:
         """Row of the step that leads to a keyframe."""

@@ -23,7 +23,7 @@ from lineloom_core.simulation import SimulatedScan, World
 from tests.core.mapping.drives import component_error, feed, fingerprint, legs, scans_of
 from tests.core.mapping.sites import lay_places, lay_track, link, thinned
 
-TIGHT = MapperConfig(thinning=ThinningConfig(most_alike=2, apart=12.0))
+TIGHT = MapperConfig(thinning=ThinningConfig(most_alike=2, apart=12.0), chapter=32)
 NEVER = MapperConfig(thinning=ThinningConfig(most_alike=1_000_000))
 
 
@@ -86,6 +86,23 @@ def test_what_rests_moves_on_with_what_it_rests_on() -> None:
     assert resting.on(3) == (3, Pose.identity())
     assert 7 in resting
     assert 3 not in resting
+
+
+def test_resting_agrees_with_its_slow_twin() -> None:
+    rng = np.random.default_rng(3)
+    resting, twin = Resting(), dict[int, tuple[int, Pose]]()
+    staying = list(range(300))
+    for keyframe in rng.permutation(300).tolist()[:290]:
+        staying.remove(keyframe)
+        holder, T = int(rng.choice(staying)), Pose.from_array(rng.normal(size=3))
+        resting.lay(keyframe, holder, T)
+        for other, (on, T_on) in twin.items():
+            if on == keyframe:
+                twin[other] = holder, T @ T_on
+        twin[keyframe] = holder, T
+    assert len(resting) == 290
+    assert {k: resting.on(k) for k in range(300) if k in resting} == twin
+    assert all(resting.on(k) == (k, Pose.identity()) for k in (*staying, 10_000))
 
 
 @pytest.fixture(scope="module")
