@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from dataclasses import dataclass, field, fields
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from lineloom_core.features import ExtractionConfig, ScanFeatures, extract_features
 from lineloom_core.features._kernels import VAR_OFFSET
 from lineloom_core.geometry import Pose
+from lineloom_core.lately import UsedLately
 from lineloom_core.matching.local_map import Cloud
 from lineloom_core.scan import Scan
 
@@ -83,7 +84,7 @@ class Keyframe:
         return np.column_stack([lines[:, :4], np.sqrt(lines[:, VAR_OFFSET])])
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in self.__dict__.items() if name != "segments"}
+        return {f.name: self.__dict__[f.name] for f in fields(self)}
 
     @property
     def features(self) -> ScanFeatures:
@@ -96,11 +97,7 @@ class Keyframe:
         return _cloud(self)
 
 
-@lru_cache(maxsize=_DERIVED_KEPT)
-def _features(keyframe: Keyframe) -> ScanFeatures:
-    return extract_features(keyframe.scan, keyframe.extraction)
-
-
-@lru_cache(maxsize=_DERIVED_KEPT)
-def _cloud(keyframe: Keyframe) -> Cloud:
-    return Cloud.of(keyframe.features)
+_features = UsedLately[Keyframe, ScanFeatures](
+    lambda f: extract_features(f.scan, f.extraction), _DERIVED_KEPT
+)
+_cloud = UsedLately[Keyframe, Cloud](lambda f: Cloud.of(f.features), _DERIVED_KEPT)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property, lru_cache
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from lineloom_core.features._kernels import (
 )
 from lineloom_core.fusion import LineObservations, fuse
 from lineloom_core.geometry import Pose
+from lineloom_core.lately import UsedLately
 from lineloom_core.matching._free_space_kernels import CONFLICT, judge_cloud
 from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
 from lineloom_core.matching.local_map import Cloud, LocalMap
@@ -98,6 +99,10 @@ class Place:
     anchor: int
     glimpses: tuple[Glimpse, ...]
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what can be made again."""
+        return {f.name: self.__dict__[f.name] for f in fields(self)}
+
     @property
     def keyframes(self) -> tuple[int, ...]:
         """Ids of its keyframes, in their order."""
@@ -168,8 +173,7 @@ class Place:
         return conflict / max(matched + conflict, 1.0)
 
 
-@lru_cache(maxsize=_BODIES_KEPT)
-def _body(place: Place) -> Body:
+def _make_body(place: Place) -> Body:
     """Fuse a place's glimpses."""
     sights = [(g.sight, g.T_anchor_laser) for g in place.glimpses]
     features = [sight.features for sight, _ in sights]
@@ -191,6 +195,9 @@ def _body(place: Place) -> Body:
         angle_increments=np.array([f.angle_increment for f in features]),
         sweep_poses=np.array([T.to_array() for _, T in sights]),
     )
+
+
+_body = UsedLately[Place, Body](_make_body, _BODIES_KEPT)
 
 
 def count_points(
