@@ -6,7 +6,7 @@ from collections import Counter
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from lineloom_service.engine.messages import Feed, StartSite, StopSite
+from lineloom_service.engine.messages import Chapter, Feed, StartSite, StopSite
 from lineloom_service.engine.turns import Turns
 
 
@@ -73,6 +73,8 @@ def test_within_a_site_orders_stay_in_order() -> None:
 def test_a_new_start_voids_what_waits() -> None:
     turns = Turns()
     turns.put(_feed(1))
+    turns.put(Chapter(1, 2, b"history"))
+    assert isinstance(turns.next(), Chapter)
     turns.put(StartSite(1, 2, 0, None))
     assert isinstance(turns.next(), StartSite)
     turns.put(StopSite(1))

@@ -191,15 +191,7 @@ class SiteRunner:
     async def _host(self) -> None:
         if self._recorder is not None:
             self._recorded = await self._recorder.recorded_position(self.site)
-        snapshot = await self._store.latest_snapshot(self.site, self._producer)
-        self._saved = 0 if snapshot is None else snapshot.position
-        self._scans_sent = self._scans_done = 0 if snapshot is None else snapshot.scans
-        self._sent = self._done = self._saved
-        # What was answered from is recorded or saved, the later of the two; the log has it all.
-        self.expected = min(self._end, max(self.expected, self._recorded, self._saved))
-        self._marks = {self._done: self._scans_done}
-        self._under_way.clear()
-        await self._start(snapshot)
+        await self._restore()
         self._troubles.pop("start", None)
         while True:
             self._wake.clear()
@@ -214,13 +206,22 @@ class SiteRunner:
                 await self._drain()
                 await self.save()
 
-    async def _start(self, snapshot: SnapshotRecord | None) -> None:
+    async def _restore(self) -> None:
+        """Start from the latest snapshot, or from nothing."""
+        snapshot = await self._store.latest_snapshot(self.site, self._producer)
+        self._saved = 0 if snapshot is None else snapshot.position
         self._chapters = 0 if snapshot is None else snapshot.end
+        self._scans_sent = self._scans_done = 0 if snapshot is None else snapshot.scans
+        self._sent = self._done = self._saved
+        # What was answered from is recorded or saved, the later of the two; the log has it all.
+        self.expected = min(self._end, max(self.expected, self._recorded, self._saved))
+        self._marks = {self._done: self._scans_done}
+        self._under_way.clear()
         if snapshot is None:
             await self._engine.start_site(self.site, 0, None)
         else:
             chapters = self._store.chapters(self.site, snapshot)
-            await self._engine.start_site(self.site, snapshot.position, snapshot.data, chapters)
+            await self._engine.start_site(self.site, self._saved, snapshot.data, chapters)
 
     async def _send(self) -> None:
         # The next events go on from the view right there, so that view has to be published.
