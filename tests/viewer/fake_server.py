@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import socket
 import threading
 import time
@@ -32,6 +33,7 @@ class FakeServer:
         self.streams = True
         self.posted: list[tuple[str, Any]] = []
         self.url = ""
+        self._news: list[dict[str, Any]] = []
         self._port = 0
         self._server: uvicorn.Server | None = None
         self._thread: threading.Thread | None = None
@@ -89,16 +91,17 @@ class FakeServer:
 
         @router.get(f"{_SITE}/map")
         def line_map(request: Request, since: int | None = None) -> Response:
-            etag = f'"{site.version}"'
-            if request.headers.get("If-None-Match") == etag:
-                return Response(status_code=304, headers={"ETag": etag})
-            answer = site.map() if since is None else site.changes(since)
-            return JSONResponse(answer, headers={"ETag": etag})
+            return self._versioned(request, site.map() if since is None else site.changes(since))
 
         @router.get(f"{_SITE}/constraints")
-        def constraints(kind: str) -> Any:
+        def constraints(request: Request, kind: str) -> Response:
             found = site.constraints if kind == "rendezvous" else []
-            return {"version": site.version, "constraints": found, "next_cursor": None}
+            page = {"version": site.version, "constraints": found, "next_cursor": None}
+            return self._versioned(request, page)
+
+        @router.get(f"{_SITE}/graph")
+        def graph(request: Request) -> Response:
+            return self._versioned(request, site.graph())
 
         @router.get(f"{_SITE}/constraints/{{identity}}")
         def constraint(identity: str) -> Any:
@@ -123,8 +126,14 @@ class FakeServer:
         router.add_api_route(f"{_SITE}/floorplan/differences", site.differences)
         router.add_api_route(_SITE, site.site)
         router.add_api_route(f"{_SITE}/robots", site.robots)
-        router.add_api_route(f"{_SITE}/graph", site.graph)
         return router
+
+    def _versioned(self, request: Request, content: Any) -> Response:
+        """Answer, or say that the page has it already."""
+        etag = f'"{self.site.version}"'
+        if request.headers.get("If-None-Match") == etag:
+            return Response(status_code=304, headers={"ETag": etag})
+        return JSONResponse(content, headers={"ETag": etag})
 
     def _actions(self) -> APIRouter:
         router = APIRouter()
@@ -155,15 +164,25 @@ class FakeServer:
         return router
 
     async def _events(self) -> AsyncIterator[str]:
-        """One event for every new version."""
-        told = self.site.version
+        """For every new version what has changed, a map with it; or else what `tell` was given."""
+        told, before = self.site.version, self.site.told()
         yield ": here we are\n\n"
         server = self._server
         while server is not None and not server.should_exit:
             if self.site.version != told:
-                told = self.site.version
-                yield f'id: {told}\nevent: map\ndata: {{"version": {told}}}\n\n'
+                told, now = self.site.version, self.site.told()
+                news = [event for key, event in now.items() if before.get(key) != event]
+                before = now
+                for event in self._news or [*news, {"type": "map"}]:
+                    data = json.dumps(event | {"version": told})
+                    yield f"id: {told}\nevent: {event['type']}\ndata: {data}\n\n"
+                self._news = []
             await asyncio.sleep(0.03)
+
+    def tell(self, *news: dict[str, Any]) -> None:
+        """Say that just this has happened."""
+        self._news = list(news)
+        self.site.version += 1
 
 
 def _problem(status: int, detail: str) -> Response:

@@ -73,6 +73,15 @@ class FakeSite:
             "trouble": self.trouble,
         }
 
+    def told(self) -> dict[str, dict[str, Any]]:
+        """What events tell of as it is now: one for each thing that is not as it was."""
+        told = {
+            c["id"]: {"type": "constraint", "kind": c["kind"], "state": c["state"]}
+            for c in self.constraints
+        }
+        kind = "component-merged" if self.joined else "component-split"
+        return told | {"c1": {"type": kind, "component": "c1"}}
+
     def floorplan(self, plan: dict[str, dict[str, float]]) -> dict[str, Any]:
         """`GET …/floorplan`."""
         places = [

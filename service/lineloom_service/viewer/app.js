@@ -129,6 +129,7 @@ export class App {
       onState: (state) => this._takeState(state),
       onRobots: (robots) => this._takeRobots(robots),
       onSite: (answer) => this.badge.site(answer),
+      onShown: () => this.view.shown(),
       onEvent: (event) => event.type === "reset" && this.api.forget(),
       onConnection: (connection, detail) => this._takeConnection(connection, detail),
     });

@@ -8,6 +8,9 @@ import { LineSet } from "./line_set.js";
  * A piece of trajectory at keyframe resolution: x, y per point in the component's frame.
  */
 
+/** What is made of a graph, which several versions may share. @type {WeakMap<import("../net/contract.js").GraphAnswer, {keyframes: Map<number, Keyframe>, paths: Path[]}>} */
+const MADE_OF = new WeakMap();
+
 /** Everything that the page shows of a site at one version; never changed once made. */
 export class SiteState {
   /**
@@ -27,12 +30,12 @@ export class SiteState {
     this.robotNames = robotNamesOf(site, robots);
     this.robots = [...robots].sort((a, b) => (a.robot < b.robot ? -1 : 1));
     this.lines = lines ?? LineSet.of(map.lines, this.robotNames);
-    /** @type {Map<number, Keyframe>} */
-    this.keyframes = new Map(graph.nodes.map((node) => [node.id, node]));
+    const { keyframes, paths } = madeOf(graph);
+    this.keyframes = keyframes;
     /** @type {Map<string, ConstraintAnswer>} */
     this.constraints = new Map(constraints.map((c) => [c.id, c]));
     this.submaps = graph.graph.submaps ?? [];
-    this.paths = pathsOf(graph);
+    this.paths = paths;
     this.components = componentsOf(this);
   }
 
@@ -119,6 +122,16 @@ function turnedBounds({ keyframes, lines }, id, theta) {
     for (let i = 4 * start; i < 4 * end; i += 2) add(lines.ends[i], lines.ends[i + 1]);
   }
   return bounds;
+}
+
+/** @param {import("../net/contract.js").GraphAnswer} graph */
+function madeOf(graph) {
+  let made = MADE_OF.get(graph);
+  if (!made) {
+    made = { keyframes: new Map(graph.nodes.map((node) => [node.id, node])), paths: pathsOf(graph) };
+    MADE_OF.set(graph, made);
+  }
+  return made;
 }
 
 /** Return the robots' ways from keyframe to keyframe, cut where a step is not known. @param {import("../net/contract.js").GraphAnswer} graph @returns {Path[]} */

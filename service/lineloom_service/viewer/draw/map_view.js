@@ -60,6 +60,8 @@ export class MapView {
     this._fresh = new FreshLines();
     /** @type {Transition|null} */
     this._transition = null;
+    /** @type {(() => void)[]} */
+    this._awaited = [];
     this._frame = 0;
     this._ratio = 1;
     new ResizeObserver(() => this._resize()).observe(canvas);
@@ -91,6 +93,13 @@ export class MapView {
     if (this.following && this._transition) this._transition.carry(this.camera, this._fitted());
     else if (this.following) this.fit();
     this.repaint();
+  }
+
+  /** Settled once the state shown last is drawn, and its components are in their places. @returns {Promise<void>} */
+  shown() {
+    if (!this.state) return Promise.resolve();
+    this.draw();
+    return new Promise((resolve) => this._awaited.push(resolve));
   }
 
   /** Show robots' new poses on the same map. @param {import("../net/contract.js").RobotAnswer[]} robots */
@@ -164,6 +173,7 @@ export class MapView {
   _drawMap(context, scene) {
     const { camera, palette } = this;
     const more = this._picture.draw(context, camera, this._ratio);
+    if (!more) for (const resolve of this._awaited.splice(0)) resolve();
     const chosen = this.selected?.id ?? "";
     drawComponents(context, camera, scene, this.selected?.kind === "component" ? chosen : "");
     this._fresh.draw(context, camera, scene);

@@ -1,4 +1,5 @@
 import { ProblemError, UnreachableError } from "./api.js";
+import { Due } from "./due.js";
 import { EventStream } from "./event_stream.js";
 import { SiteReader } from "./site_reader.js";
 
@@ -7,16 +8,16 @@ const WATCHDOG_MS = 15000;
 const LEAST_PAUSE_MS = 350;
 const MOST_PAUSE_MS = 10000;
 const RETRY_MS = [500, 1000, 2000, 4000, 8000];
-/** Events after which only the robots have moved. */
-const LIGHT = new Set(["scan", "robot"]);
 
 /**
  * @typedef {"connecting"|"live"|"polling"|"away"|"unauthorised"|"forbidden"|"empty"|"failed"} Connection
  * @typedef {{onState: (state: import("../data/site_state.js").SiteState) => void,
  *   onRobots: (robots: import("./contract.js").RobotAnswer[]) => void,
  *   onSite: (site: import("./contract.js").SiteAnswer) => void,
+ *   onShown: () => Promise<unknown>,
  *   onEvent: (event: {type: string, data: any}) => void,
  *   onConnection: (connection: Connection, detail: string) => void}} Listener
+ * onShown: settled once what came last is drawn
  */
 
 /**
@@ -28,12 +29,11 @@ export class SiteFeed {
   constructor(api, site, listener) {
     this._api = api;
     this._path = `v1/sites/${encodeURIComponent(site)}/events`;
-    this._reader = new SiteReader(api, site);
+    this._due = new Due();
+    this._reader = new SiteReader(api, site, (part, took) => this._due.fetched(part, took));
     this._listener = listener;
     this._stopped = false;
     this._version = -1;
-    /** @type {"none"|"robots"|"all"} */
-    this._due = "all";
     this._wake = () => {};
     this._failures = 0;
     this._streaming = false;
@@ -58,7 +58,7 @@ export class SiteFeed {
 
   /** Ask for everything now. */
   refresh() {
-    this._due = "all";
+    this._due.everything();
     this._failures = 0;
     this._wake();
   }
@@ -66,10 +66,8 @@ export class SiteFeed {
   async _readLoop() {
     while (!this._stopped) {
       const began = performance.now();
-      const what = this._due;
-      this._due = "none";
       try {
-        await this._read(what);
+        await this._read();
         this._failures = 0;
       } catch (error) {
         this._fail(error);
@@ -78,28 +76,32 @@ export class SiteFeed {
       }
       // The heavier the site, the longer the pause: at most a fifth of the time is spent asking.
       const took = performance.now() - began;
-      await this._pause(Math.min(Math.max(4 * took, LEAST_PAUSE_MS), MOST_PAUSE_MS));
-      if (this._due === "none") await this._sleep(this._streaming ? WATCHDOG_MS : POLL_MS, false);
-      if (this._due === "none") this._due = "robots";
+      const pause = this._pause(Math.min(Math.max(4 * took, LEAST_PAUSE_MS), MOST_PAUSE_MS));
+      await Promise.race([this._listener.onShown(), this._pause(MOST_PAUSE_MS)]);
+      await pause;
+      const idle = this._streaming ? WATCHDOG_MS : POLL_MS;
+      if (this._due.wait > 0) await this._sleep(Math.min(this._due.wait, idle), false);
+      if (this._due.wait > 0) this._due.robots();
     }
   }
 
-  /** @param {"none"|"robots"|"all"} what */
-  async _read(what) {
+  async _read() {
     const site = await this._reader.site();
     if (this._stopped) return;
     this._listener.onConnection(this._streaming ? "live" : "polling", "");
     this._listener.onSite(site);
-    if (document.hidden) return;
     // Without events, only the version tells that something has changed.
     const changed = site.version !== this._version;
     if (site.version < this._version) this._reader.forget();
-    if (what === "all" || (changed && !this._streaming)) {
-      const state = await this._reader.state();
+    if (changed && !this._streaming) this._due.everything();
+    const due = this._due.begin();
+    if (document.hidden) return; // all is asked for when the page is looked at again
+    if (due.state) {
+      const state = await this._reader.state(due);
       if (this._stopped) return;
       this._version = state.version;
       this._listener.onState(state);
-    } else if (changed || what === "robots") {
+    } else if (changed || due.robots) {
       const robots = await this._reader.robots();
       if (!this._stopped) this._listener.onRobots(robots);
     }
@@ -129,20 +131,16 @@ export class SiteFeed {
 
   /** @param {{type: string, data: any}} event */
   _take(event) {
-    if (LIGHT.has(event.type)) {
-      if (this._due === "none") this._due = "robots";
-    } else {
-      this._due = "all";
-      if (event.type === "reset") this._reader.forget();
-      this._listener.onEvent(event);
-    }
+    this._due.note(event);
+    if (event.type === "reset") this._reader.forget();
+    this._listener.onEvent(event);
     this._wake();
   }
 
   /** @param {unknown} error */
   _fail(error) {
     if (this._stopped) return;
-    this._due = "all";
+    this._due.everything();
     this._failures += 1;
     this._reader.forget();
     if (error instanceof ProblemError) {
