@@ -12,7 +12,7 @@ from lineloom.wire import JSON, MSGPACK
 from pydantic_core import from_json
 
 from lineloom_service.body_budget import lease_of
-from lineloom_service.body_pace import paced
+from lineloom_service.body_pace import take_paced
 from lineloom_service.errors import (
     MALFORMED_BODY,
     TOO_LARGE,
@@ -89,12 +89,15 @@ async def _read(request: Request, settings: Settings) -> bytes:
         raise _too_large(limit)
     parts: list[bytes] = []
     size = 0
-    pace = settings.slow_sender_s, settings.min_body_rate
-    async for part in paced(request.stream(), *pace):
+
+    def take(part: bytes) -> None:
+        nonlocal size
         size += len(part)
         if size > limit:
             raise _too_large(limit)
         parts.append(part)
+
+    await take_paced(request.stream(), settings.slow_sender_s, settings.min_body_rate, take)
     return b"".join(parts)
 
 
