@@ -10,7 +10,7 @@ import pytest
 
 CHURN = """
 import sys
-from lineloom_service.allocator import give_back
+from lineloom_service.allocator import give_back, trim
 
 def resident_mb():
     status = open("/proc/self/status").read()
@@ -18,6 +18,14 @@ def resident_mb():
 
 if sys.argv[1] == "tamed":
     assert give_back()
+elif sys.argv[1] != "as it is":
+    many = [bytearray(3_000) for _ in range(30_000)]
+    stay = many[::50]
+    del many
+    if sys.argv[1] == "trimmed":
+        trim()
+    print(resident_mb())
+    sys.exit()
 del_me = bytearray(30_000_000)
 del del_me  # from now on glibc by itself takes such blocks from its heap
 before = resident_mb()
@@ -36,7 +44,7 @@ pytestmark = pytest.mark.skipif(
 
 
 def left_mb(how: str) -> float:
-    """Resident memory [MB] that 100 freed blocks of 1 MB leave behind."""
+    """Resident memory [MB] that the churn leaves behind."""
     done = subprocess.run(
         [sys.executable, "-c", CHURN, how], stdout=subprocess.PIPE, text=True, check=True
     )
@@ -45,6 +53,10 @@ def left_mb(how: str) -> float:
 
 def test_freed_blocks_are_given_back() -> None:
     assert left_mb("tamed") < 10.0
+
+
+def test_trimming_gives_back_what_is_free_between_what_stays() -> None:
+    assert left_mb("trimmed") < left_mb("untrimmed") - 60.0
 
 
 def test_the_churn_is_one_that_the_c_library_keeps() -> None:

@@ -15,6 +15,7 @@ from multiprocessing.connection import Connection
 from lineloom_core import timing
 from lineloom_core.mapping.snapshot import Snapshot
 
+from lineloom_service.allocator import trim
 from lineloom_service.engine.current_entry import BUSY, RESTORING, CurrentEntry
 from lineloom_service.engine.mapper import QUESTIONS, Mapper, MapperFactory, apply, load
 from lineloom_service.engine.messages import (
@@ -228,6 +229,7 @@ class Worker:
         finally:
             self._current.clear()
         self._connection.send(SnapshotTaken(order.site, order.run, snapshot))
+        trim()
 
     def _answer(self, order: Ask) -> None:
         hosted = self._hosted(order)
