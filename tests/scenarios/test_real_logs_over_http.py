@@ -1,12 +1,16 @@
-"""Real buildings as a user would map them: the command line, a real service, the SDK."""
+"""Real buildings as a user would map them: the command line, a real service, the SDK.
+
+Both are replayed at the same time, to two sites of one service, which maps them side by side.
+"""
 
 from __future__ import annotations
 
 import json
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import ExitStack
 from itertools import accumulate
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,38 +23,61 @@ from tests.scenarios.real_logs import CSAIL, FR079, RealLog
 
 pytestmark = pytest.mark.scenario
 
+LOGS = {"csail": CSAIL, "freiburg": FR079}
+"""By the site that each is replayed to."""
 
-def replay(log: RealLog, url: str, site: str) -> dict[str, Any]:
-    """`lineloom replay LOG --split 3 --no-odometry`; its figures."""
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ChildService]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("LINELOOM_WORKERS", str(len(LOGS)))
+        with ChildService(tmp_path_factory.mktemp("data")) as started:
+            started.wait_until_ready()
+            yield started
+
+
+@pytest.fixture(scope="module")
+def replays(service: ChildService) -> Iterator[dict[str, subprocess.Popen[str]]]:
+    """`lineloom replay LOG --split 3 --no-odometry` of every log that is there, under way."""
+    with ExitStack() as running:
+        yield {
+            site: running.enter_context(replay(log, service, site))
+            for site, log in LOGS.items()
+            if log.log.is_file()
+        }
+
+
+def replay(log: RealLog, service: ChildService, site: str) -> subprocess.Popen[str]:
+    """Start it; it prints its figures."""
     command = [sys.executable, "-m", "lineloom.cli", "replay", str(log.log)]
-    options = ["--split", "3", "--no-odometry", "--site", site, "--url", url, "--json"]
-    done = subprocess.run([*command, *options], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    figures: dict[str, Any] = json.loads(done.stdout)
-    return figures
+    command += ["--split", "3", "--no-odometry", "--site", site, "--url", service.url, "--json"]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
-@pytest.mark.parametrize("log", [CSAIL, FR079], ids=lambda log: log.name)
-def test_a_replayed_log_becomes_one_right_map(log: RealLog, tmp_path: Path) -> None:
+@pytest.mark.parametrize("site", LOGS)
+def test_a_replayed_log_becomes_one_right_map(
+    site: str, service: ChildService, replays: dict[str, subprocess.Popen[str]]
+) -> None:
+    log = LOGS[site]
     log.require()
+    output, errors = replays[site].communicate()
+    assert replays[site].returncode == 0, errors
+    figures: dict[str, Any] = json.loads(output)
+    assert (figures["accepted"], figures["rejected"]) == (log.scans, 0)
     streams = load([log.log], split_into=3, odometry=False)
     first_row = accumulate((len(s.scans) for s in streams), initial=0)
-    with ChildService(tmp_path / "data") as service:
-        service.wait_until_ready()
-        figures = replay(log, service.url, "building")
-        assert (figures["accepted"], figures["rejected"]) == (log.scans, 0)
-        names = sorted(s.robot for s in streams)
-        assert [sorted(robots) for robots in figures["components"]] == [names]
-        rows, poses = [], []
-        with Client(service.url) as client:
-            for stream, offset in zip(streams, first_row, strict=False):
-                for pose in client.trajectory("building", stream.robot).poses:
-                    rows.append(offset + pose.seq)
-                    poses.append((pose.x, pose.y, pose.theta))
-            state = client.site("building")
-            assert (state.idle, state.scans.pending) == (True, 0)
-            found = client.map("building")
-            picture = client.map_file("building", "svg")
+    names = sorted(s.robot for s in streams)
+    assert [sorted(robots) for robots in figures["components"]] == [names]
+    rows, poses = [], []
+    with Client(service.url) as client:
+        for stream, offset in zip(streams, first_row, strict=False):
+            for pose in client.trajectory(site, stream.robot).poses:
+                rows.append(offset + pose.seq)
+                poses.append((pose.x, pose.y, pose.theta))
+        state = client.site(site)
+        assert (state.idle, state.scans.pending) == (True, 0)
+        found = client.map(site)
+        picture = client.map_file(site, "svg")
     log.check(np.array(rows), np.array(poses))
     assert sum(np.hypot(w.x2 - w.x1, w.y2 - w.y1) for w in found.lines if w.support >= 10) > 150.0
     assert len(picture) > 10_000

@@ -9,9 +9,9 @@ import time
 from pathlib import Path
 
 from lineloom_core.matching import LineMatcher
+from lineloom_service import server
 from lineloom_service.engine.local_engine import LocalEngine
 from lineloom_service.observation import log
-from lineloom_service.server import run_service
 from lineloom_service.service import Service
 from lineloom_service.settings import Settings
 
@@ -31,8 +31,9 @@ def _serve(directory: Path, port: int) -> None:
         LineMatcher.match = lambda *_: time.sleep(3600.0)  # type: ignore[assignment]
     service = Service(settings, engine=engine)
     if "SERVER_HANGS" in os.environ:  # as on a database that does not answer
+        server._CLOSE_S = 1
         service.store.close = lambda: asyncio.sleep(3600.0)  # type: ignore[method-assign]
-    run_service(service)
+    server.run_service(service)
 
 
 if __name__ == "__main__":

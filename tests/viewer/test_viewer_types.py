@@ -37,7 +37,7 @@ def test_a_wrong_type_in_it_is_found(tsc: str, tmp_path: Path) -> None:
     shutil.copytree(VIEWER, tmp_path / "viewer")
     camera = tmp_path / "viewer" / "draw" / "camera.js"
     camera.write_text(camera.read_text() + '\nnew Camera().pan("far", 1);\n')
-    config = json.loads(CONFIG.read_text()) | {"include": ["viewer/**/*.js"]}
+    config = json.loads(CONFIG.read_text()) | {"include": ["viewer/draw/camera.js"]}
     (tmp_path / "tsconfig.json").write_text(json.dumps(config))
     (found,) = complaints(tsc, tmp_path / "tsconfig.json")
     assert "camera.js" in found
