@@ -84,6 +84,13 @@ def test_compose_has_a_service_a_worker_and_a_database() -> None:
     assert used == declared
 
 
+def test_a_workers_history_goes_to_the_disk() -> None:
+    worker = COMPOSE["services"]["worker"]
+    folder = worker["environment"]["TMPDIR"]
+    assert not any(folder.startswith(memory) for memory in worker["tmpfs"])
+    assert f"VOLUME {folder}" in (ROOT / "docker" / "Dockerfile").read_text()
+
+
 def test_compose_brings_no_password() -> None:
     text = (ROOT / "docker" / "compose.yaml").read_text()
     for line in text.splitlines():
