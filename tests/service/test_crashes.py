@@ -9,7 +9,7 @@ import os
 import random
 import signal
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import groupby, islice
 from pathlib import Path
 from typing import Any
@@ -26,54 +26,23 @@ from lineloom_service.store.sql_store import SqlStore
 from lineloom_service.store.sqlite_database import SqliteDatabase
 
 from tests.service.fake_server import free_port, server
+from tests.service.plain_robots import Scans, Stream, drive, plain_scan
 
 FAKE = "fake_mapper:FakeMapper"
-STREAMS = (("alone", "r"), ("shared", "r1"), ("shared", "r2"))
+STREAMS: tuple[Stream, ...] = (("alone", "r"), ("shared", "r1"), ("shared", "r2"))
 
 _NOT_POSTED = ("robot", "truth", "odometry")
-
-Scans = Callable[[int], dict[str, Any]]
-
-
-def _plain_scan(seq: int) -> dict[str, Any]:
-    return {
-        "seq": seq,
-        "stamp": float(seq % 500),
-        "angle_min": -1.0,
-        "angle_increment": 0.1,
-        "range_min": 0.1,
-        "range_max": 30.0,
-        "ranges": [1.0 + 0.01 * (seq % 97)] * 20,
-    }
-
-
-async def _send(port: int, acknowledged: dict[tuple[str, str], int], scan: Scans) -> None:
-    """Every robot sends scan after scan, each until acknowledged, until the server is gone."""
-
-    async def robot(stream: tuple[str, str], client: httpx.AsyncClient) -> None:
-        url = f"http://127.0.0.1:{port}/v1/sites/{stream[0]}/robots/{stream[1]}/scans"
-        while True:
-            try:
-                response = await client.post(url, json=scan(acknowledged[stream]))
-            except httpx.TransportError:
-                return
-            assert response.status_code == 202, response.text
-            acknowledged[stream] += 1
-            await asyncio.sleep(0.002)
-
-    async with httpx.AsyncClient(timeout=60.0) as client:
-        await asyncio.gather(*(robot(stream, client) for stream in STREAMS))
 
 
 async def _disturb(
     port: int,
     process: subprocess.Popen[bytes],
     rng: random.Random,
-    acknowledged: dict[tuple[str, str], int],
+    acknowledged: dict[Stream, int],
     scan: Scans,
 ) -> int:
     """Send, kill some workers on the way, then the server; return the number of kills."""
-    sending = asyncio.create_task(_send(port, acknowledged, scan))
+    sending = asyncio.create_task(drive(port, STREAMS, acknowledged, scan=scan, pause_s=0.002))
     kills = 0
     for _ in range(rng.randrange(3)):
         await _progress(acknowledged, rng.randrange(1, 60))
@@ -87,7 +56,7 @@ async def _disturb(
     return kills + 1
 
 
-async def _progress(acknowledged: dict[tuple[str, str], int], more: int) -> None:
+async def _progress(acknowledged: dict[Stream, int], more: int) -> None:
     goal = sum(acknowledged.values()) + more
     for _ in range(60_000):
         if sum(acknowledged.values()) >= goal:
@@ -177,13 +146,13 @@ def _expect_as_mapped(maps: dict[str, bytes], site: str, view: SiteView) -> None
 
 def test_kills_at_random_points_lose_nothing_and_leave_the_same_map(tmp_path: Path) -> None:
     importlib.import_module("fake_mapper")  # this process feeds it as well
-    assert _run(tmp_path, FAKE, seed=3, lives=2, scan=_plain_scan) >= 2
+    assert _run(tmp_path, FAKE, seed=3, lives=2, scan=plain_scan) >= 2
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 2])
 def test_dozens_of_kills_lose_nothing_and_leave_the_same_map(tmp_path: Path, seed: int) -> None:
-    assert _run(tmp_path, FAKE, seed, lives=20, scan=_plain_scan) >= 30
+    assert _run(tmp_path, FAKE, seed, lives=20, scan=plain_scan) >= 30
 
 
 @pytest.mark.long

@@ -16,38 +16,9 @@ from lineloom_service.server import run
 from lineloom_service.settings import Settings
 
 from tests.service.fake_server import free_port, server, server_process
+from tests.service.plain_robots import Stream, drive, plain_scan
 
-ROBOTS = 4
-
-
-def _scan(seq: int) -> dict[str, Any]:
-    return {
-        "seq": seq,
-        "stamp": float(seq % 500),
-        "angle_min": -1.0,
-        "angle_increment": 0.1,
-        "range_min": 0.1,
-        "range_max": 30.0,
-        "ranges": [1.0 + 0.01 * (seq % 97)] * 20,
-    }
-
-
-async def _send_until_killed(port: int, acknowledged: dict[str, int]) -> None:
-    """Each robot sends scan after scan, and counts those answered 202, until the server is gone."""
-
-    async def robot(name: str, client: httpx.AsyncClient) -> None:
-        url = f"http://127.0.0.1:{port}/v1/sites/s/robots/{name}/scans"
-        while True:
-            seq = acknowledged.get(name, 0)
-            try:
-                response = await client.post(url, json=_scan(seq))
-            except httpx.TransportError:
-                return
-            assert response.status_code == 202
-            acknowledged[name] = seq + 1
-
-    async with httpx.AsyncClient() as client:
-        await asyncio.gather(*(robot(f"r{number}", client) for number in range(ROBOTS)))
+STREAMS: tuple[Stream, ...] = tuple(("s", f"r{number}") for number in range(4))
 
 
 def _site(port: int) -> dict[str, Any]:
@@ -65,11 +36,11 @@ def _idle(port: int) -> dict[str, Any]:
 
 
 async def _send_and_kill(
-    port: int, process: subprocess.Popen[bytes], acknowledged: dict[str, int], more: int
+    port: int, process: subprocess.Popen[bytes], acknowledged: dict[Stream, int], more: int
 ) -> None:
     """SIGKILL the server in the middle of things, after `more` acknowledged scans."""
     goal = sum(acknowledged.values()) + more
-    sending = asyncio.create_task(_send_until_killed(port, acknowledged))
+    sending = asyncio.create_task(drive(port, STREAMS, acknowledged))
     while sum(acknowledged.values()) < goal and not sending.done():
         await asyncio.sleep(0.001)
     process.send_signal(signal.SIGKILL)
@@ -78,7 +49,7 @@ async def _send_and_kill(
 
 
 def test_a_killed_server_has_lost_nothing_leaves_no_worker_and_maps_on(tmp_path: Path) -> None:
-    port, acknowledged = free_port(), dict[str, int]()
+    port, acknowledged = free_port(), dict.fromkeys(STREAMS, 0)
     with server(tmp_path, port) as process:
         workers = _children(process.pid)
         asyncio.run(_send_and_kill(port, process, acknowledged, 151))
@@ -90,7 +61,7 @@ def test_a_killed_server_has_lost_nothing_leaves_no_worker_and_maps_on(tmp_path:
         robots = httpx.get(f"http://127.0.0.1:{port}/v1/sites/s/robots").json()["robots"]
         for robot in robots:
             # The last scan may have been stored, and its answer lost with the server.
-            surplus = robot["scans"]["processed"] - acknowledged[robot["robot"]]
+            surplus = robot["scans"]["processed"] - acknowledged["s", robot["robot"]]
             assert surplus in (0, 1)
         process.send_signal(signal.SIGTERM)
         assert process.wait(20) in (0, -signal.SIGTERM)
@@ -139,7 +110,7 @@ def test_listeners_are_let_go_when_it_stops(tmp_path: Path) -> None:
     port = free_port()
     url = f"http://127.0.0.1:{port}/v1/sites/s"
     with server(tmp_path, port) as process, httpx.Client(timeout=60.0) as client:
-        client.post(f"{url}/robots/r/scans", json=_scan(0)).raise_for_status()
+        client.post(f"{url}/robots/r/scans", json=plain_scan(0)).raise_for_status()
         with client.stream("GET", f"{url}/events") as listened:
             lines = listened.iter_lines()
             next(lines)

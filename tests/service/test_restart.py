@@ -111,11 +111,12 @@ def _until(done: Callable[[], bool]) -> None:
 
 def _reasons_until_ready(port: int) -> set[str]:
     reasons: set[str] = set()
-    for _ in range(3000):
-        answer = httpx.get(f"http://127.0.0.1:{port}/readyz")
-        if answer.status_code == 200:
-            return reasons
-        assert answer.status_code == 503
-        reasons.update(answer.json()["reasons"])
-        time.sleep(0.005)
+    with httpx.Client(trust_env=False, verify=False) as client:
+        for _ in range(3000):
+            answer = client.get(f"http://127.0.0.1:{port}/readyz")
+            if answer.status_code == 200:
+                return reasons
+            assert answer.status_code == 503
+            reasons.update(answer.json()["reasons"])
+            time.sleep(0.005)
     raise AssertionError(f"never ready: {reasons}")

@@ -16,33 +16,9 @@ from lineloom_service.store.sql_store import SqlStore
 from tests.service.databases import POSTGRESQL, fresh_database
 from tests.service.fake_mapper import FakeMapper
 from tests.service.fake_server import free_port, server, server_process
+from tests.service.plain_robots import Stream, drive
 
 SLOW = {"FAKE_MAPPER_SECONDS": "0.002"}
-
-
-def _scan(seq: int) -> dict[str, Any]:
-    return {
-        "seq": seq,
-        "stamp": float(seq % 500),
-        "angle_min": -1.0,
-        "angle_increment": 0.1,
-        "range_min": 0.1,
-        "range_max": 30.0,
-        "ranges": [1.0 + 0.01 * (seq % 97)] * 20,
-    }
-
-
-async def _drive(port: int, robot: str, goal: int, acknowledged: dict[str, int]) -> None:
-    """Send scans up to `goal`, or until the server is gone; count those answered 202."""
-    async with httpx.AsyncClient(timeout=60.0) as client:
-        url = f"http://127.0.0.1:{port}/v1/sites/s/robots/{robot}/scans"
-        while acknowledged[robot] < goal:
-            try:
-                response = await client.post(url, json=_scan(acknowledged[robot]))
-            except httpx.TransportError:
-                return
-            assert response.status_code == 202, response.text
-            acknowledged[robot] += 1
 
 
 async def _idle(port: int) -> dict[str, Any]:
@@ -65,9 +41,9 @@ async def _entries(path: Path, url: str | None) -> list[LogEntry]:
 
 
 def _expect_all_mapped(
-    site: dict[str, Any], entries: list[LogEntry], acknowledged: dict[str, int]
+    site: dict[str, Any], entries: list[LogEntry], acknowledged: dict[Stream, int]
 ) -> None:
-    for robot, count in acknowledged.items():
+    for (_, robot), count in acknowledged.items():
         seqs = [entry.seq for entry in entries if entry.robot == robot]
         assert seqs == list(range(len(seqs)))
         assert len(seqs) - count in (0, 1)  # stored, and its answer lost with the process
@@ -79,7 +55,8 @@ def _expect_all_mapped(
 
 
 async def test_a_standby_maps_on_when_the_process_that_mapped_is_killed(tmp_path: Path) -> None:
-    acknowledged = {"at-first": 0, "at-second": 0}
+    at_first, at_second = ("s", "at-first"), ("s", "at-second")
+    acknowledged = {at_first: 0, at_second: 0}
     ports = free_port(), free_port()
     async with fresh_database(POSTGRESQL) as url:
         assert url is not None
@@ -89,15 +66,15 @@ async def test_a_standby_maps_on_when_the_process_that_mapped_is_killed(tmp_path
             server(tmp_path / "b", ports[1], **environment),
         ):
             driving = [
-                asyncio.create_task(_drive(ports[0], "at-first", 10**6, acknowledged)),
-                asyncio.create_task(_drive(ports[1], "at-second", 300, acknowledged)),
+                asyncio.create_task(drive(ports[0], [at_first], acknowledged)),
+                asyncio.create_task(drive(ports[1], [at_second], acknowledged, goal=300)),
             ]
-            while acknowledged["at-first"] < 130 or acknowledged["at-second"] < 10:
+            while acknowledged[at_first] < 130 or acknowledged[at_second] < 10:
                 await asyncio.sleep(0.001)
                 assert not any(task.done() for task in driving)
             first.send_signal(signal.SIGKILL)
             await asyncio.gather(*driving)
-            assert acknowledged["at-second"] == 300  # whoever was left took scans all the while
+            assert acknowledged[at_second] == 300  # whoever was left took scans all the while
             site = await _idle(ports[1])
         entries = await _entries(tmp_path, url)
     _expect_all_mapped(site, entries, acknowledged)
@@ -106,11 +83,12 @@ async def test_a_standby_maps_on_when_the_process_that_mapped_is_killed(tmp_path
 async def test_the_directory_of_a_killed_process_is_free_and_that_of_a_living_one_is_not(
     tmp_path: Path,
 ) -> None:
-    acknowledged = {"r": 0}
+    alone = ("s", "r")
+    acknowledged = {alone: 0}
     ports = free_port(), free_port()
     with server(tmp_path, ports[0], **SLOW) as first:
-        driving = asyncio.create_task(_drive(ports[0], "r", 10**6, acknowledged))
-        while acknowledged["r"] < 130:
+        driving = asyncio.create_task(drive(ports[0], [alone], acknowledged))
+        while acknowledged[alone] < 130:
             await asyncio.sleep(0.001)
             assert not driving.done()
         with server_process(tmp_path, ports[1]) as second:
