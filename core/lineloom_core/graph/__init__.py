@@ -15,10 +15,9 @@ from lineloom_core.graph.covariance import (
 )
 from lineloom_core.graph.edge import Edge, EdgeKind, chi_squared
 from lineloom_core.graph.growing import GrowingArray
-from lineloom_core.graph.initialise import initialise_from_tree, rigid_join
-from lineloom_core.graph.inliers import InlierTest, select_inliers
 from lineloom_core.graph.observability import Observability, observe, project_out_weak
 from lineloom_core.graph.piece import Piece, together
+from lineloom_core.graph.piece_join import rigid_join
 from lineloom_core.graph.pose_graph import PoseGraph
 from lineloom_core.graph.solver import Solution, optimize, settle
 
@@ -28,7 +27,6 @@ __all__ = [
     "Edge",
     "EdgeKind",
     "GrowingArray",
-    "InlierTest",
     "Observability",
     "Piece",
     "PoseGraph",
@@ -38,7 +36,6 @@ __all__ = [
     "consistent_sets",
     "cycle_errors",
     "in_map_axes",
-    "initialise_from_tree",
     "largest_consistent_set",
     "marginal_covariance",
     "observe",
@@ -46,7 +43,6 @@ __all__ = [
     "pairwise_consistent",
     "project_out_weak",
     "rigid_join",
-    "select_inliers",
     "settle",
     "together",
 ]

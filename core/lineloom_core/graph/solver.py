@@ -98,45 +98,20 @@ def settle(piece: Piece, held: int) -> NDArray[np.float64]:
     return levenberg_marquardt(piece, held) if poses is None else poses
 
 
-def weighted_step(
-    nodes: Mapping[int, Pose],
-    edges: Sequence[Edge],
-    weights: Sequence[float],
-    anchor: int,
-    max_iterations: int,
-) -> dict[int, Pose]:
-    """Return the poses after at most `max_iterations` of plain weighted least squares.
-
-    No kernel: each edge's information is scaled by its weight. For outer loops that reweight.
-    """
-    piece = Piece.of(nodes, edges)
-    solved = levenberg_marquardt(
-        piece, piece.row(anchor), np.asarray(weights), max_iterations=max_iterations
-    )
-    rows = zip(piece.ids.tolist(), solved.tolist(), strict=True)
-    return {node: Pose(*row) for node, row in rows}
-
-
 def levenberg_marquardt(
     piece: Piece,
     held: int,
-    weights: NDArray[np.float64] | None = None,
     *,
-    max_iterations: int = _MAX_ITERATIONS,
     tolerance: float = _TOLERANCE,
 ) -> NDArray[np.float64]:
-    """Return what `settle` does, by gtsam.
-
-    weights: (m,) factors on the edges' information, instead of the robust kernel.
-    tolerance: of the cost, relative and absolute.
-    """
+    """Return what `settle` does, by gtsam. tolerance: of the cost, relative and absolute."""
     values = gtsam.Values()
     for i, (x, y, theta) in enumerate(piece.poses.tolist()):
         values.insert(i, gtsam.Pose2(x, y, theta))
-    graph = _factor_graph(piece, weights)
+    graph = _factor_graph(piece)
     prior = gtsam.noiseModel.Isotropic.Sigma(3, _ANCHOR_SIGMA)
     graph.add(gtsam.PriorFactorPose2(held, gtsam.Pose2(*piece.poses[held].tolist()), prior))
-    parameters = _parameters(max_iterations, tolerance)
+    parameters = _parameters(tolerance)
     optimizer = gtsam.LevenbergMarquardtOptimizer(graph, values, parameters)
     solved: NDArray[np.float64] = gtsam.utilities.extractPose2(optimizer.optimize())
     solved[:, 2] = wrap_array(solved[:, 2])
@@ -148,10 +123,8 @@ def _weight(edge: Edge, chi2: float) -> float:
     return CAUCHY_K**2 / (CAUCHY_K**2 + chi2) if edge.robust else 1.0
 
 
-def _factor_graph(piece: Piece, weights: NDArray[np.float64] | None) -> gtsam.NonlinearFactorGraph:
+def _factor_graph(piece: Piece) -> gtsam.NonlinearFactorGraph:
     roots = square_roots(piece.information)
-    if weights is not None:
-        roots = roots * np.sqrt(weights)[:, None, None]
     kernel = gtsam.noiseModel.mEstimator.Cauchy.Create(CAUCHY_K)
     graph = gtsam.NonlinearFactorGraph()
     ends, measured, robust = piece.ends.tolist(), piece.measured.tolist(), piece.robust.tolist()
@@ -159,16 +132,16 @@ def _factor_graph(piece: Piece, weights: NDArray[np.float64] | None) -> gtsam.No
         # smart=False: gtsam must not rewrite the root as sigmas, that divides by the zeros of a
         # corridor's information.
         noise: gtsam.noiseModel.Base = gtsam.noiseModel.Gaussian.SqrtInformation(root, False)
-        if yields and weights is None:
+        if yields:
             noise = gtsam.noiseModel.Robust.Create(kernel, noise)
         graph.add(gtsam.BetweenFactorPose2(a, b, gtsam.Pose2(*T_a_b), noise))
     return graph
 
 
-def _parameters(max_iterations: int, tolerance: float) -> gtsam.LevenbergMarquardtParams:
+def _parameters(tolerance: float) -> gtsam.LevenbergMarquardtParams:
     parameters = gtsam.LevenbergMarquardtParams()
     parameters.setOrderingType("METIS")
-    parameters.setMaxIterations(max_iterations)
+    parameters.setMaxIterations(_MAX_ITERATIONS)
     parameters.setRelativeErrorTol(tolerance)
     parameters.setAbsoluteErrorTol(tolerance)
     return parameters

@@ -12,11 +12,9 @@ from lineloom_core.graph import (
     Piece,
     UndeterminedError,
     in_map_axes,
-    initialise_from_tree,
     marginal_covariance,
     optimize,
     rigid_join,
-    select_inliers,
 )
 from lineloom_core.graph.edge import chi_squared
 from numpy.typing import NDArray
@@ -103,22 +101,6 @@ def test_what_hangs_loose_is_said_so() -> None:
         Covariances(Piece.of({0: Pose.identity()}, []), 0).of(5)
 
 
-def test_tree_follows_the_surest_path() -> None:
-    good, bad = np.diag([1e4, 1e4, 1e4]), np.diag([1.0, 1.0, 1.0])
-    edges = [
-        Edge("bad", "loop", 0, 2, Pose(9.0, 9.0, 0.0), bad, True),
-        Edge("ab", "sequential", 0, 1, Pose(1.0, 0.0, 0.5), good, False),
-        Edge("cb", "sequential", 2, 1, Pose(-1.0, 0.0, 0.0), good, False),
-        Edge("far", "sequential", 7, 8, Pose(1.0, 0.0, 0.0), good, False),
-    ]
-    known = {0: Pose(2.0, 3.0, 0.0)}
-    poses = initialise_from_tree(known, edges)
-    assert sorted(poses) == [1, 2]
-    expected = Pose(2.0, 3.0, 0.0) @ Pose(1.0, 0.0, 0.5) @ Pose(1.0, 0.0, 0.0)
-    np.testing.assert_allclose(poses[2].to_array(), expected.to_array(), atol=1e-12)
-    assert initialise_from_tree(known, edges[::-1]) == poses
-
-
 def two_pieces(
     wrong: int, seed: int = 3
 ) -> tuple[dict[int, Pose], dict[int, Pose], list[Edge], Pose]:
@@ -168,31 +150,6 @@ def test_turning_an_edge_round_changes_nothing() -> None:
     straight = Edge("s", "loop", 0, 1, T, information, True)
     chi2 = chi_squared([straight, turned], poses)
     assert chi2[0] == pytest.approx(chi2[1], rel=5e-3)
-
-
-def test_inliers_are_told_from_outliers() -> None:
-    a, b, edges, T_A_B = two_pieces(wrong=3)
-    inner = [
-        Edge(
-            f"s{n}",
-            "sequential",
-            n,
-            n + 1,
-            piece[n].between(piece[n + 1]),
-            np.diag([1e4, 1e4, 1e5]),
-            False,
-        )
-        for piece in (a, b)
-        for n in list(piece)[:-1]
-    ]
-    start = {**a, **{n: Pose(0.5, 0.5, 0.3) @ T_A_B @ p for n, p in b.items()}}
-    test = select_inliers(start, inner, edges, anchor=0)
-    assert test.inliers == ("r3", "r4", "r5", "r6", "r7")
-    assert all(test.chi2[f"r{k}"] > 100.0 for k in range(3))
-    assert select_inliers(start, inner, edges, anchor=0).poses == test.poses
-    everything_right = select_inliers(start, inner, edges[3:], anchor=0)
-    assert len(everything_right.inliers) == 5
-    assert select_inliers(start, inner, [], anchor=0).inliers == ()
 
 
 def test_covariance_shrinks_when_a_loop_closes() -> None:

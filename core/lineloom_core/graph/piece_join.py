@@ -1,8 +1,7 @@
-"""First poses for nodes and pieces that the graph has just learned of."""
+"""The frame in which a piece of graph joins another."""
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -12,40 +11,9 @@ from lineloom_core.geometry import Pose
 from lineloom_core.graph import se2
 from lineloom_core.graph.edge import Edge
 
-_LEAST_INFORMATION = 1e-6  # stands for "not observed" when edges are compared
 _CHI2_CAP = 11.345  # 99 % of chi-squared with 3 degrees of freedom: beyond it all is equally wrong
 _CAUCHY_K = 3.0
 _REFINEMENTS = 10
-
-
-def initialise_from_tree(known: Mapping[int, Pose], edges: Sequence[Edge]) -> dict[int, Pose]:
-    """Return poses for all nodes that edges connect with the known ones, and only for those.
-
-    Follows the surest path: Dijkstra from all known nodes at once, the length of an edge being the
-    sum of its variances. Nodes that stay out of reach are left out. Deterministic in the values
-    given, whatever the order of the edges.
-    """
-    ordered = sorted(edges, key=lambda e: (e.node_a, e.node_b, e.id))
-    at: dict[int, list[tuple[int, float, Edge]]] = {}
-    for edge, cost in zip(ordered, _total_variances(ordered), strict=True):
-        at.setdefault(edge.node_a, []).append((edge.node_b, cost, edge))
-        at.setdefault(edge.node_b, []).append((edge.node_a, cost, edge))
-    poses: dict[int, Pose] = dict(known)
-    distance = dict.fromkeys(sorted(known), 0.0)
-    queue = [(0.0, node) for node in sorted(known)]
-    done: dict[int, None] = {}
-    while queue:
-        far, node = heapq.heappop(queue)
-        if node in done:
-            continue
-        done[node] = None
-        for other, cost, edge in at.get(node, ()):
-            if far + cost < distance.get(other, np.inf):
-                distance[other] = far + cost
-                T_node_other = edge.T_a_b if edge.node_a == node else edge.T_a_b.inverse()
-                poses[other] = poses[node] @ T_node_other
-                heapq.heappush(queue, (far + cost, other))
-    return {node: pose for node, pose in poses.items() if node not in known}
 
 
 def rigid_join(
@@ -76,14 +44,6 @@ def rigid_join(
         step = -np.linalg.lstsq(H, g, rcond=1e-12)[0]  # corridors alone leave H singular
         T = se2.compose(T, step)
     return Pose.from_array(T)
-
-
-def _total_variances(edges: Sequence[Edge]) -> list[float]:
-    if not edges:
-        return []
-    values = np.linalg.eigvalsh(np.stack([e.information for e in edges]))
-    totals: list[float] = (1.0 / np.maximum(values, _LEAST_INFORMATION)).sum(axis=1).tolist()
-    return totals
 
 
 def _across(
