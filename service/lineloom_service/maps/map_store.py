@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from lineloom_core.io.selection import BBox
 from lineloom_core.mapping.site_view import SiteView
@@ -12,6 +13,18 @@ from lineloom_service.maps.line_history import LineHistory
 from lineloom_service.maps.map_json import write_line, write_map
 from lineloom_service.maps.render_cache import RenderCache
 from lineloom_service.store.records import SiteRecord
+
+
+@dataclass(frozen=True, slots=True)
+class MapPart:
+    """What of a map is asked for. since: a version; only what changed after it."""
+
+    component: str | None = None
+    box: BBox | None = None
+    since: int | None = None
+
+
+WHOLE_MAP = MapPart()
 
 
 class MapStore:
@@ -30,37 +43,25 @@ class MapStore:
         """
         site = self._asked.pop(site_id, None)
         if site is not None:
-            task = asyncio.create_task(self._json(site, view))
+            task = asyncio.create_task(self._json(site, view, WHOLE_MAP))
             self._preparing.add(task)
             task.add_done_callback(self._preparing.discard)
 
-    async def json(
-        self,
-        site: SiteRecord,
-        view: SiteView,
-        component: str | None = None,
-        box: BBox | None = None,
-        since: int | None = None,
-    ) -> bytes:
-        """Return the map as JSON, or what changed in it after a version."""
-        if component is None and box is None and since is None:
+    async def json(self, site: SiteRecord, view: SiteView, part: MapPart = WHOLE_MAP) -> bytes:
+        """Return the map as JSON, or a part of it."""
+        if part == WHOLE_MAP:
             self._asked[site.id] = site
-        return await self._json(site, view, component, box, since)
+        return await self._json(site, view, part)
 
-    async def _json(
-        self,
-        site: SiteRecord,
-        view: SiteView,
-        component: str | None = None,
-        box: BBox | None = None,
-        since: int | None = None,
-    ) -> bytes:
+    async def _json(self, site: SiteRecord, view: SiteView, part: MapPart) -> bytes:
         history = self._histories.setdefault(site.id, LineHistory(write_line))
 
         def render() -> bytes:
-            return write_map(site.name, view, history.at(view), component, box, since)
+            return write_map(
+                site.name, view, history.at(view), part.component, part.box, part.since
+            )
 
-        return await self._cache.get((site.id, view.version, "json", component, box, since), render)
+        return await self._cache.get((site.id, view.version, "json", part), render)
 
     async def other(
         self,

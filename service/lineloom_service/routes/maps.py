@@ -22,6 +22,7 @@ from lineloom_service.dependencies import CurrentView, KnownSite, ServiceDep
 from lineloom_service.errors import INVALID_PARAMETER, UNKNOWN_COMPONENT, ProblemError
 from lineloom_service.map_files import FORMATS, read_bbox, render_map
 from lineloom_service.map_frames import AlignQuery, FrameQuery, in_frame, versioned
+from lineloom_service.maps.map_store import MapPart
 from lineloom_service.openapi import NOT_MODIFIED, also_as
 
 router = APIRouter(tags=["map"])
@@ -74,7 +75,7 @@ async def get_map(
     if matches(if_none_match, headers["ETag"]):
         return Response(status_code=304, headers=headers)
     if plain:
-        content = await service.maps.json(site, view, component, box, since)
+        content = await service.maps.json(site, view, MapPart(component, box, since))
     else:
         shown = await in_frame(service, site, view, align=align, frame=frame, component=component)
         content = await render_map(service, site, shown, format, component, box, resolution)
