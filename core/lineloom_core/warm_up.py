@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba.core.event import install_recorder
 
 from lineloom_core.fusion.occupancy import rasterise
 from lineloom_core.mapping.site_mapper import SiteMapper
@@ -12,8 +13,18 @@ from lineloom_core.matching import LineMatcher
 from lineloom_core.scan import Scan
 
 
-def warm_up() -> None:
-    """Run a short made-up drive through mapper and matcher; seconds without a cache, else less."""
+def warm_up() -> bool:
+    """Run a short made-up drive through mapper and matcher; a minute without a cache, else less.
+
+    Returns whether anything had to be compiled: the compiler keeps some 300 MB for as long as its
+    process runs, and another one, that finds all in the cache, does without.
+    """
+    with install_recorder("numba:compile") as compiled:
+        _drive()
+    return bool(compiled.buffer)
+
+
+def _drive() -> None:
     mapper = SiteMapper()
     scans = [_room_scan(x, seq) for seq, x in enumerate(np.arange(0.0, 11.0, 0.45))]
     for scan in scans:

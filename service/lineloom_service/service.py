@@ -28,6 +28,7 @@ from lineloom_service.store.records import SiteRecord
 from lineloom_service.store.sql_store import SqlStore
 
 _LOG = logging.getLogger(__name__)
+_LOOK_S = 0.05
 
 
 class Service:
@@ -83,7 +84,7 @@ class Service:
         self.engine.subscribe(self._latency.on_view)
         await self.conductor.start()
         self.engine.subscribe(self._on_view)
-        self._warming = asyncio.create_task(self.matcher.warm_up())
+        self._warming = asyncio.create_task(self._warm_up())
         self._warming.add_done_callback(_report_failure)
 
     async def stop(self) -> None:
@@ -94,6 +95,15 @@ class Service:
         await self.guard.stop()
         await self.conductor.stop()
         await self.store.close()
+
+    async def _warm_up(self) -> None:
+        """Load the matcher's kernels; where workers compile them, once they have.
+
+        The compiler would keep 300 MB of this process for as long as it runs.
+        """
+        while self.conductor.maps and self.engine.not_ready():
+            await asyncio.sleep(_LOOK_S)
+        await self.matcher.warm_up()
 
     def _on_view(self, site_id: int, _position: int, _view: SiteView) -> None:
         # Not this very view: one from before a restart is not shown.

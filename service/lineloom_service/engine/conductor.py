@@ -54,6 +54,11 @@ class Conductor:
         self._forgetting: set[asyncio.Task[None]] = set()
         self._mapping = self._was_standby = False
 
+    @property
+    def maps(self) -> bool:
+        """Whether it is this process that maps."""
+        return self._mapping
+
     async def start(self) -> None:
         """Map every site that the store knows, or answer from what another process maps."""
         self._store.subscribe(self._on_commit)

@@ -6,6 +6,7 @@ import contextlib
 import logging
 import os
 import signal
+import sys
 import threading
 import time
 import zlib
@@ -48,6 +49,7 @@ from lineloom_service.store.records import LogEntry
 _LOG = logging.getLogger(__name__)
 
 _NICENESS = 5
+_COMPILED = "LINELOOM_WORKER_HAS_COMPILED"
 _CAUGHT_UP_PAUSE_S = 0.05
 _PUBLISHING_SHARE = 0.1
 """At most this share of a worker's time goes into building and sending views of a site."""
@@ -301,15 +303,22 @@ def run_worker(
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     threading.Thread(target=_end_with_service, args=(life,), daemon=True).start()
     with contextlib.suppress(OSError):
-        os.nice(_NICENESS)  # answers go before mapping
+        os.nice(_NICENESS - os.nice(0))  # answers go before mapping
     configure_from_environment()
     factory = load(mapper)
-    if warm_up is not None:
-        load(warm_up)()
+    if warm_up is not None and load(warm_up)():
+        _begin_again()
     connection: Connection[Sent, Order] = Connection(pipe)
     # The service has closed its end: nobody is left to report to.
     with contextlib.suppress(BrokenPipeError, ConnectionResetError):
         Worker(connection, CurrentEntry(current), factory, publish_every_s).serve()
+
+
+def _begin_again() -> None:
+    """Be the same process anew, without the compiler and all that it keeps; once at most."""
+    if _COMPILED not in os.environ:
+        os.environ[_COMPILED] = "1"
+        os.execv(sys.executable, sys.orig_argv)
 
 
 def _end_with_service(life: int) -> None:
