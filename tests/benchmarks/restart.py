@@ -73,13 +73,13 @@ def kill(service: ChildService) -> None:
     os.killpg(service.pid, signal.SIGKILL)  # its workers as well
 
 
-def seconds_away(service: ChildService, version: int) -> float:
+def seconds_away(service: ChildService, version: int, site: str = SITE) -> float:
     """Start, wait until all is as before, kill; how long that took."""
     begin = time.perf_counter()
     with service:
         service.wait_until_ready(600.0)
         with Client(service.url) as client:
-            while client.map(SITE).version < version:
+            while client.map(site).version < version:
                 time.sleep(_POLL_S)
         seconds = time.perf_counter() - begin
         kill(service)

@@ -22,6 +22,7 @@ from lineloom_core.scan import Scan
 from lineloom_core.simulation import Fleet, sick_lms200
 
 from tests.benchmarks.environment import environment
+from tests.benchmarks.restart import seconds_away
 from tests.benchmarks.row import Row, table
 from tests.benchmarks.saved_sites import saved_bytes
 from tests.benchmarks.soak_watch import Moment, SlowReaders, Watch, look
@@ -48,27 +49,27 @@ def soaking(share: float) -> list[Row]:
     fleet = Fleet.office(seed=4, robots=ROBOTS, duration_s=share * HOUR_S, lidar=sick_lms200())
     posts = _posts(fleet)
     half = int(share * HOUR_S / _SECONDS_A_POST) * ROBOTS // 2
-    with (
-        tempfile.TemporaryDirectory(prefix="lineloom-bench-") as name,
-        environment(_SETTINGS),
-        ChildService(Path(name)) as service,
-        Client(service.url, retry=_PATIENT) as client,
-    ):
-        service.wait_until_ready()
-        assert service.pid is not None
-        moments = [look("start", service.pid, 0, 0)]
-        _send(client, islice(posts, ROBOTS))
-        with SlowReaders(service.port, SITE, _READERS), Watch(service.url, SITE) as watch:
-            for when, part in (("middle", islice(posts, half - ROBOTS)), ("end", posts)):
-                _send(client, part)
-                client.wait_until_idle(SITE, timeout=7200.0)
-                saved = saved_bytes(service.data_dir)
-                moments.append(look(when, service.pid, watch.keyframes(), saved))
-            dropped = _READERS - watch.listeners()
-            refused = watch.refused()
+    with tempfile.TemporaryDirectory(prefix="lineloom-bench-") as name, environment(_SETTINGS):
+        service = ChildService(Path(name))
+        with service, Client(service.url, retry=_PATIENT) as client:
+            service.wait_until_ready()
+            assert service.pid is not None
+            moments = [look("start", service.pid, 0, 0)]
+            _send(client, islice(posts, ROBOTS))
+            with SlowReaders(service.port, SITE, _READERS), Watch(service.url, SITE) as watch:
+                for when, part in (("middle", islice(posts, half - ROBOTS)), ("end", posts)):
+                    _send(client, part)
+                    client.wait_until_idle(SITE, timeout=7200.0)
+                    saved = saved_bytes(service.data_dir)
+                    moments.append(look(when, service.pid, watch.keyframes(), saved))
+                dropped = _READERS - watch.listeners()
+                refused = watch.refused()
+            version = client.map(SITE).version
+        away_s = seconds_away(service, version, SITE)
     report = _report(moments, watch.highest_backlog, refused, dropped)
     print(report, file=sys.stderr)  # stdout is for the rows
-    return _rows(moments, f"backlog to {watch.highest_backlog}, {refused} refused")
+    note = f"backlog to {watch.highest_backlog}, {refused} refused"
+    return [*_rows(moments, note), _restart(away_s, share)]
 
 
 def _posts(fleet: Fleet) -> Posts:
@@ -120,6 +121,19 @@ def _rows(moments: list[Moment], note: str) -> list[Row]:
         )
         for process in moments[0].rss_bytes
     ]
+
+
+def _restart(away_s: float, share: float) -> Row:
+    return Row(
+        name="soak: restart, until the map is there as it was",
+        figure=away_s,
+        unit="s",
+        better="lower",
+        goal=10.0,
+        baseline="the drive",
+        baseline_figure=share * HOUR_S,
+        note="wall clock; kernels cached",
+    )
 
 
 def _grown(before: Moment, after: Moment) -> dict[str, float]:
