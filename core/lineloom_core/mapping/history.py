@@ -42,7 +42,7 @@ class History:
         self._open: dict[int, Keyframe] = {}
         self._register = Register()
         self._tracks = 0
-        self._checks: list[int] = []
+        self._checks: list[int] = []  # of the chapters, in their order
         self._begin()
 
     def _begin(self) -> None:
@@ -132,10 +132,6 @@ class History:
         """What came of comparing places before the chapter of this one was sealed; else nothing."""
         number = place // self._length
         return self._chapter(number).recognitions if number < self.sealed else {}
-
-    def robot(self, keyframe: int) -> str:
-        """Name of the robot that made a keyframe."""
-        return self[keyframe].robot
 
     def of(self, robot: str, session: str | None = None) -> list[int]:
         """Ids of a robot's keyframes, ascending; of one session or of all."""
