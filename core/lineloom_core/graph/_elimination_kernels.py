@@ -202,26 +202,26 @@ def factorise(diagonal, below, starts, rows, least):  # type: ignore[no-untyped-
                 B[r, 2] = (B[r, 2] - B[r, 0] * l20 - B[r, 1] * l21) * i2
         for p in range(first, last):
             u, A = rows[p], below[p]
-            subtract_product(diagonal[u], A, A)
+            subtract_product(diagonal[u], A, A.T)
             t = starts[u]
             for q in range(p + 1, last):
                 while rows[t] != rows[q]:
                     t += 1
-                subtract_product(below[t], below[q], A)
+                subtract_product(below[t], below[q], A.T)
     return -1
 
 
 @njit(cache=True)
-def subtract_product(C, B, A):  # type: ignore[no-untyped-def]
-    """C -= B A' of 3x3 blocks."""
-    a00, a01, a02 = A[0, 0], A[0, 1], A[0, 2]
-    a10, a11, a12 = A[1, 0], A[1, 1], A[1, 2]
-    a20, a21, a22 = A[2, 0], A[2, 1], A[2, 2]
+def subtract_product(C, A, B):  # type: ignore[no-untyped-def]
+    """C -= A B of 3x3 blocks, any of which may be a transposed view."""
+    b00, b01, b02 = B[0, 0], B[0, 1], B[0, 2]
+    b10, b11, b12 = B[1, 0], B[1, 1], B[1, 2]
+    b20, b21, b22 = B[2, 0], B[2, 1], B[2, 2]
     for r in range(3):
-        b0, b1, b2 = B[r, 0], B[r, 1], B[r, 2]
-        C[r, 0] -= b0 * a00 + b1 * a01 + b2 * a02
-        C[r, 1] -= b0 * a10 + b1 * a11 + b2 * a12
-        C[r, 2] -= b0 * a20 + b1 * a21 + b2 * a22
+        a0, a1, a2 = A[r, 0], A[r, 1], A[r, 2]
+        C[r, 0] -= a0 * b00 + a1 * b10 + a2 * b20
+        C[r, 1] -= a0 * b01 + a1 * b11 + a2 * b21
+        C[r, 2] -= a0 * b02 + a1 * b12 + a2 * b22
 
 
 @njit(cache=True)
@@ -274,18 +274,18 @@ def diagonal_of_inverse(diagonal, below, starts, rows):  # type: ignore[no-untyp
         first, last = starts[j], starts[j + 1]
         for p in range(first, last):  # Z[u, j] = -(sum over w of Z[u, w] L[w, j]) L[j, j]^-1
             u = rows[p]
-            subtract_plain_product(Z[p], out[u], below[p])
+            subtract_product(Z[p], out[u], below[p])
             t = starts[u]
             for q in range(p + 1, last):
                 while rows[t] != rows[q]:
                     t += 1
-                subtract_turned_product(Z[p], Z[t], below[q])
-                subtract_plain_product(Z[q], Z[t], below[p])
+                subtract_product(Z[p], Z[t].T, below[q])
+                subtract_product(Z[q], Z[t], below[p])
         d = diagonal[j]
         invert_turned(d, S)
         for p in range(first, last):
             divide_right(Z[p], d)
-            subtract_turned_product(S, Z[p], below[p])
+            subtract_product(S, Z[p].T, below[p])
         divide_right(S, d)
         for r in range(3):
             for c in range(3):
@@ -301,29 +301,3 @@ def invert_turned(d, out):  # type: ignore[no-untyped-def]
     out[0, 1] = -d[1, 0] * out[0, 0] * out[1, 1]
     out[1, 2] = -d[2, 1] * out[1, 1] * out[2, 2]
     out[0, 2] = -(d[2, 0] * out[0, 0] + d[2, 1] * out[0, 1]) * out[2, 2]
-
-
-@njit(cache=True)
-def subtract_plain_product(C, A, B):  # type: ignore[no-untyped-def]
-    """C -= A B of 3x3 blocks."""
-    b00, b01, b02 = B[0, 0], B[0, 1], B[0, 2]
-    b10, b11, b12 = B[1, 0], B[1, 1], B[1, 2]
-    b20, b21, b22 = B[2, 0], B[2, 1], B[2, 2]
-    for r in range(3):
-        a0, a1, a2 = A[r, 0], A[r, 1], A[r, 2]
-        C[r, 0] -= a0 * b00 + a1 * b10 + a2 * b20
-        C[r, 1] -= a0 * b01 + a1 * b11 + a2 * b21
-        C[r, 2] -= a0 * b02 + a1 * b12 + a2 * b22
-
-
-@njit(cache=True)
-def subtract_turned_product(C, A, B):  # type: ignore[no-untyped-def]
-    """C -= A' B of 3x3 blocks."""
-    b00, b01, b02 = B[0, 0], B[0, 1], B[0, 2]
-    b10, b11, b12 = B[1, 0], B[1, 1], B[1, 2]
-    b20, b21, b22 = B[2, 0], B[2, 1], B[2, 2]
-    for r in range(3):
-        a0, a1, a2 = A[0, r], A[1, r], A[2, r]
-        C[r, 0] -= a0 * b00 + a1 * b10 + a2 * b20
-        C[r, 1] -= a0 * b01 + a1 * b11 + a2 * b21
-        C[r, 2] -= a0 * b02 + a1 * b12 + a2 * b22
