@@ -38,39 +38,46 @@ def bench() -> None:
     """
 
 
+Matchers = Annotated[
+    str,
+    typer.Option(
+        metavar="NAMES",
+        help="Who takes part, with commas: all, baselines, peers, or names from the table.",
+    ),
+]
+PairsFolder = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FOLDER",
+        help="Real pairs (*.npz); ../shared/data/pairs beside the checkout if left out.",
+    ),
+]
+Simulated = Annotated[
+    int,
+    typer.Option(
+        min=0, max=1000, metavar="N", help="Simulated pairs per lidar and overlap; 0 for none."
+    ),
+]
+Limit = Annotated[
+    int | None,
+    typer.Option(min=1, metavar="N", help="At most so many pairs of each tier and overlap."),
+]
+Worst = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FOLDER",
+        help="Draw each matcher's ten worst answers per collection into this folder.",
+    ),
+]
+
+
 @app.command("pairs")
 def pairs(
-    matchers: Annotated[
-        str,
-        typer.Option(
-            metavar="NAMES",
-            help="Who takes part, with commas: all, baselines, peers, or names from the table.",
-        ),
-    ] = "all",
-    data: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Real pairs (*.npz); ../shared/data/pairs beside the checkout if left out.",
-        ),
-    ] = None,
-    simulated: Annotated[
-        int,
-        typer.Option(
-            min=0, max=1000, metavar="N", help="Simulated pairs per lidar and overlap; 0 for none."
-        ),
-    ] = 40,
-    limit: Annotated[
-        int | None,
-        typer.Option(min=1, metavar="N", help="At most so many pairs of each tier and overlap."),
-    ] = None,
-    worst: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Draw each matcher's ten worst answers per collection into this folder.",
-        ),
-    ] = None,
+    matchers: Matchers = "all",
+    data: PairsFolder = None,
+    simulated: Simulated = 40,
+    limit: Limit = None,
+    worst: Worst = None,
     json: options.Json = False,
 ) -> None:
     """Run matchers over scan pairs whose true pose is known: how often right, how sure, how fast.

@@ -16,35 +16,42 @@ SHARED_PLANS = Path(__file__).resolve().parents[5] / "shared" / "data" / "floorp
 """Where real floor plans lie beside a checkout: `../shared/data` from the project's root."""
 
 
+Quick = Annotated[bool, typer.Option("--quick", help="Small fleets only: about a minute.")]
+Rounds = Annotated[
+    int,
+    typer.Option(min=1, max=100, metavar="N", help="Buildings per class and size of fleet."),
+]
+Seed = Annotated[
+    int, typer.Option(min=0, metavar="N", help="Seed of buildings, fleets and faults.")
+]
+Jobs = Annotated[
+    int, typer.Option(min=1, max=64, metavar="N", help="Fleets at a time, a process each.")
+]
+OnlyClass = Annotated[
+    str | None,
+    typer.Option(metavar="CLASS", help="Only buildings whose class has this in its name."),
+]
+FloorPlans = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FOLDER",
+        help="Real floor plans (*.txt); ../shared/data beside the checkout if left out.",
+    ),
+]
+Pictures = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="Draw every false and every missed merge into DIR."),
+]
+
+
 def merges(
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Small fleets only: about a minute.")
-    ] = False,
-    rounds: Annotated[
-        int,
-        typer.Option(min=1, max=100, metavar="N", help="Buildings per class and size of fleet."),
-    ] = 2,
-    seed: Annotated[
-        int, typer.Option(min=0, metavar="N", help="Seed of buildings, fleets and faults.")
-    ] = 0,
-    jobs: Annotated[
-        int, typer.Option(min=1, max=64, metavar="N", help="Fleets at a time, a process each.")
-    ] = 1,
-    only: Annotated[
-        str | None,
-        typer.Option(metavar="CLASS", help="Only buildings whose class has this in its name."),
-    ] = None,
-    floor_plans: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Real floor plans (*.txt); ../shared/data beside the checkout if left out.",
-        ),
-    ] = None,
-    pictures: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Draw every false and every missed merge into DIR."),
-    ] = None,
+    quick: Quick = False,
+    rounds: Rounds = 2,
+    seed: Seed = 0,
+    jobs: Jobs = 1,
+    only: OnlyClass = None,
+    floor_plans: FloorPlans = None,
+    pictures: Pictures = None,
     json: options.Json = False,
 ) -> None:
     """Run fleets of 2 to 8 robots through buildings and count false and missed merges.

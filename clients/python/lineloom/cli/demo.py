@@ -20,7 +20,7 @@ from lineloom.cli.failure import Exit
 from lineloom.cli.patience import patient
 from lineloom.cli.player import Played, Player
 from lineloom.cli.schedule import Due
-from lineloom.cli.simulate import LidarName, build_fleet, scan_count
+from lineloom.cli.simulate import LidarChoice, LidarName, build_fleet, scan_count
 from lineloom.cli.truth import PairError, Truth, common_component, not_merged, table
 from lineloom.cli.watch import Watch
 from lineloom.client import Client
@@ -44,7 +44,7 @@ def demo(
     seed: Annotated[
         int, typer.Option(min=0, metavar="N", help="Another floor, other ways: another seed.")
     ] = 0,
-    lidar: Annotated[LidarName, typer.Option(help="What the robots see with.")] = LidarName.FULL,
+    lidar: LidarChoice = LidarName.FULL,
     out_dir: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="Where map.svg and map.png go.")
     ] = Path("out"),

@@ -27,39 +27,46 @@ class MatcherChoice(StrEnum):
     BOTH = "both"
 
 
+ExperimentName = Annotated[
+    str | None,
+    typer.Argument(metavar="NAME", help="Which experiment, from --list; all for all of them."),
+]
+Listing = Annotated[bool, typer.Option("--list", help="Say which experiments there are, and stop.")]
+Output = Annotated[
+    Path | None,
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="DIR",
+        help="Write report (md, json) and figures (svg, png) into this folder.",
+    ),
+]
+Seed = Annotated[
+    int, typer.Option(min=0, metavar="N", help="Seed of the sensor's noise and of samples.")
+]
+Quick = Annotated[
+    bool, typer.Option("--quick", help="A reduced run of a few seconds, to see that it works.")
+]
+Matcher = Annotated[
+    MatcherChoice, typer.Option(help="Who takes part: one of the matchers, or both.")
+]
+Data = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FOLDER",
+        help="Real data for real-scans; ../shared/data beside the checkout if left out.",
+    ),
+]
+
+
 def experiment(
-    name: Annotated[
-        str | None,
-        typer.Argument(metavar="NAME", help="Which experiment, from --list; all for all of them."),
-    ] = None,
-    listing: Annotated[
-        bool, typer.Option("--list", help="Say which experiments there are, and stop.")
-    ] = False,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="DIR",
-            help="Write report (md, json) and figures (svg, png) into this folder.",
-        ),
-    ] = None,
-    seed: Annotated[
-        int, typer.Option(min=0, metavar="N", help="Seed of the sensor's noise and of samples.")
-    ] = 0,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="A reduced run of a few seconds, to see that it works.")
-    ] = False,
-    matcher: Annotated[
-        MatcherChoice, typer.Option(help="Who takes part: one of the matchers, or both.")
-    ] = MatcherChoice.BOTH,
-    data: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Real data for real-scans; ../shared/data beside the checkout if left out.",
-        ),
-    ] = None,
+    name: ExperimentName = None,
+    listing: Listing = False,
+    output: Output = None,
+    seed: Seed = 0,
+    quick: Quick = False,
+    matcher: Matcher = MatcherChoice.BOTH,
+    data: Data = None,
     json: options.Json = False,
 ) -> None:
     """Run an experiment of the thesis's chapter 6 again, and draw its figures.

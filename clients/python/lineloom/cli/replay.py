@@ -13,49 +13,54 @@ from lineloom.cli.play import Stage, report
 from lineloom.cli.recordings import BagChoice, load
 from lineloom.cli.schedule import together
 
+Logs = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="LOG…",
+        help="CARMEN logs (.log, .clf, also .gz), ROS bags (.bag, .mcap, .db3 or a folder), "
+        "tinySLAM logs (.dat) and JSON lines (.jsonl).",
+    ),
+]
+SplitInto = Annotated[
+    int,
+    typer.Option(
+        "--split", min=1, max=100, metavar="N", help="Play each log as N robots, cut by time."
+    ),
+]
+Robot = Annotated[
+    str | None,
+    typer.Option(metavar="NAME", help="Name of the robot; else the log's own, or its file's."),
+]
+NoOdometry = Annotated[bool, typer.Option("--no-odometry", help="Leave out odometry: scans alone.")]
+Topic = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="TOPIC",
+        help="Laser topic of a bag, once per robot; all laser topics if left out.",
+    ),
+]
+BaseFrame = Annotated[
+    str, typer.Option(metavar="FRAME", help="The robot's frame in a bag's transforms.")
+]
+OdomFrame = Annotated[
+    str, typer.Option(metavar="FRAME", help="The odometry's frame in a bag's transforms.")
+]
+OdomTopic = Annotated[
+    str | None,
+    typer.Option(metavar="TOPIC", help="Odometry of a bag; else that of the scans' own namespace."),
+]
+
 
 def replay(
-    logs: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="LOG…",
-            help="CARMEN logs (.log, .clf, also .gz), ROS bags (.bag, .mcap, .db3 or a folder), "
-            "tinySLAM logs (.dat) and JSON lines (.jsonl).",
-        ),
-    ],
-    split_into: Annotated[
-        int,
-        typer.Option(
-            "--split", min=1, max=100, metavar="N", help="Play each log as N robots, cut by time."
-        ),
-    ] = 1,
+    logs: Logs,
+    split_into: SplitInto = 1,
     site: options.Site = options.DEFAULT_SITE,
-    robot: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Name of the robot; else the log's own, or its file's."),
-    ] = None,
-    no_odometry: Annotated[
-        bool, typer.Option("--no-odometry", help="Leave out odometry: scans alone.")
-    ] = False,
-    topic: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="TOPIC",
-            help="Laser topic of a bag, once per robot; all laser topics if left out.",
-        ),
-    ] = None,
-    base_frame: Annotated[
-        str, typer.Option(metavar="FRAME", help="The robot's frame in a bag's transforms.")
-    ] = "base_link",
-    odom_frame: Annotated[
-        str, typer.Option(metavar="FRAME", help="The odometry's frame in a bag's transforms.")
-    ] = "odom",
-    odom_topic: Annotated[
-        str | None,
-        typer.Option(
-            metavar="TOPIC", help="Odometry of a bag; else that of the scans' own namespace."
-        ),
-    ] = None,
+    robot: Robot = None,
+    no_odometry: NoOdometry = False,
+    topic: Topic = None,
+    base_frame: BaseFrame = "base_link",
+    odom_frame: OdomFrame = "odom",
+    odom_topic: OdomTopic = None,
     speed: options.Speed = None,
     batch: options.Batch = 50,
     timeout: options.Timeout = options.DEFAULT_TIMEOUT,

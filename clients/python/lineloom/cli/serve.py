@@ -9,62 +9,75 @@ import typer
 
 from lineloom.cli.failure import CommandError
 
+Host = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="Address to listen on; 127.0.0.1.")
+]
+Port = Annotated[
+    int | None, typer.Option(min=0, max=65535, metavar="PORT", help="Port to listen on; 8765.")
+]
+DataDir = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="Where everything is kept; ./lineloom-data."),
+]
+DatabaseUrl = Annotated[
+    str | None,
+    typer.Option(
+        metavar="URL",
+        help="PostgreSQL instead of a file: postgresql+asyncpg://user:password@host/database.",
+    ),
+]
+Engine = Annotated[
+    str | None,
+    typer.Option(
+        metavar="standby|require|off",
+        help="Where another process on the same database maps: wait for its end, refuse to "
+        "start, or never map; standby.",
+    ),
+]
+Workers = Annotated[
+    int | None,
+    typer.Option(min=1, max=64, metavar="N", help="Mapping processes; all cores but one."),
+]
+Open = Annotated[
+    bool | None,
+    typer.Option("--open", help="Listen beyond this machine although there are no tokens."),
+]
+SslCertfile = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="TLS certificate chain, PEM.")
+]
+SslKeyfile = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="The certificate's private key, PEM.")
+]
+AllowOrigins = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ORIGIN,…",
+        help="Origins whose pages may call the service, e.g. https://maps.example; none.",
+    ),
+]
+LogLevel = Annotated[
+    str | None,
+    typer.Option(metavar="LEVEL", help="debug, info, warning or error; info."),
+]
+LogFormat = Annotated[
+    str | None,
+    typer.Option(metavar="FORMAT", help="json, a line an object, or text, for people; json."),
+]
+
 
 def serve(
-    host: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Address to listen on; 127.0.0.1.")
-    ] = None,
-    port: Annotated[
-        int | None, typer.Option(min=0, max=65535, metavar="PORT", help="Port to listen on; 8765.")
-    ] = None,
-    data_dir: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Where everything is kept; ./lineloom-data."),
-    ] = None,
-    database_url: Annotated[
-        str | None,
-        typer.Option(
-            metavar="URL",
-            help="PostgreSQL instead of a file: postgresql+asyncpg://user:password@host/database.",
-        ),
-    ] = None,
-    engine: Annotated[
-        str | None,
-        typer.Option(
-            metavar="standby|require|off",
-            help="Where another process on the same database maps: wait for its end, refuse to "
-            "start, or never map; standby.",
-        ),
-    ] = None,
-    workers: Annotated[
-        int | None,
-        typer.Option(min=1, max=64, metavar="N", help="Mapping processes; all cores but one."),
-    ] = None,
-    open_: Annotated[
-        bool | None,
-        typer.Option("--open", help="Listen beyond this machine although there are no tokens."),
-    ] = None,
-    ssl_certfile: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="TLS certificate chain, PEM.")
-    ] = None,
-    ssl_keyfile: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="The certificate's private key, PEM.")
-    ] = None,
-    allow_origins: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ORIGIN,…",
-            help="Origins whose pages may call the service, e.g. https://maps.example; none.",
-        ),
-    ] = None,
-    log_level: Annotated[
-        str | None,
-        typer.Option(metavar="LEVEL", help="debug, info, warning or error; info."),
-    ] = None,
-    log_format: Annotated[
-        str | None,
-        typer.Option(metavar="FORMAT", help="json, a line an object, or text, for people; json."),
-    ] = None,
+    host: Host = None,
+    port: Port = None,
+    data_dir: DataDir = None,
+    database_url: DatabaseUrl = None,
+    engine: Engine = None,
+    workers: Workers = None,
+    open_: Open = None,
+    ssl_certfile: SslCertfile = None,
+    ssl_keyfile: SslKeyfile = None,
+    allow_origins: AllowOrigins = None,
+    log_level: LogLevel = None,
+    log_format: LogFormat = None,
 ) -> None:
     """Run the service: takes scans over HTTP, keeps them on disk, maps them.
 

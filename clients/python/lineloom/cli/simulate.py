@@ -28,37 +28,46 @@ class LidarName(StrEnum):
     FULL = "scanner-360"
 
 
+WorldName = Annotated[
+    str,
+    typer.Option(
+        metavar="WORLD",
+        help="corridors, long-corridor, office, rectangle, rooms, or a floor plan's file.",
+    ),
+]
+WorldSeed = Annotated[
+    int, typer.Option(min=0, metavar="N", help="Which of the made-up worlds of that kind.")
+]
+LidarChoice = Annotated[LidarName, typer.Option(help="What the robots see with.")]
+Robots = Annotated[int, typer.Option(min=1, max=100, metavar="N", help="How many robots.")]
+Seed = Annotated[int, typer.Option(min=0, metavar="N", help="Seed of starts, ways and noise.")]
+Duration = Annotated[
+    float, typer.Option(min=1.0, metavar="SECONDS", help="How long each robot drives.")
+]
+Odometry = Annotated[
+    bool, typer.Option("--odometry", help="Give the robots wheel odometry, which drifts.")
+]
+People = Annotated[
+    int, typer.Option(min=0, max=100, metavar="N", help="How many people walk about.")
+]
+Output = Annotated[
+    Path | None,
+    typer.Option(
+        "--output", "-o", metavar="FILE", help="Write JSON lines with true poses; send nothing."
+    ),
+]
+
+
 def simulate(
-    world: Annotated[
-        str,
-        typer.Option(
-            metavar="WORLD",
-            help="corridors, long-corridor, office, rectangle, rooms, or a floor plan's file.",
-        ),
-    ] = "office",
-    world_seed: Annotated[
-        int, typer.Option(min=0, metavar="N", help="Which of the made-up worlds of that kind.")
-    ] = 0,
-    lidar: Annotated[LidarName, typer.Option(help="What the robots see with.")] = LidarName.FULL,
-    robots: Annotated[int, typer.Option(min=1, max=100, metavar="N", help="How many robots.")] = 3,
-    seed: Annotated[
-        int, typer.Option(min=0, metavar="N", help="Seed of starts, ways and noise.")
-    ] = 0,
-    duration: Annotated[
-        float, typer.Option(min=1.0, metavar="SECONDS", help="How long each robot drives.")
-    ] = 240.0,
-    odometry: Annotated[
-        bool, typer.Option("--odometry", help="Give the robots wheel odometry, which drifts.")
-    ] = False,
-    people: Annotated[
-        int, typer.Option(min=0, max=100, metavar="N", help="How many people walk about.")
-    ] = 0,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output", "-o", metavar="FILE", help="Write JSON lines with true poses; send nothing."
-        ),
-    ] = None,
+    world: WorldName = "office",
+    world_seed: WorldSeed = 0,
+    lidar: LidarChoice = LidarName.FULL,
+    robots: Robots = 3,
+    seed: Seed = 0,
+    duration: Duration = 240.0,
+    odometry: Odometry = False,
+    people: People = 0,
+    output: Output = None,
     site: options.Site = options.DEFAULT_SITE,
     speed: options.Speed = None,
     batch: options.Batch = 50,
