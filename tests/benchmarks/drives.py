@@ -44,15 +44,12 @@ def _tracker(scans: list[Scan]) -> Row:
         return tracker.track(features, Cloud.of(features), scan.stamp)
 
     baseline = IdcMatcher()
-    return Row(
-        name="tracker, per scan (CSAIL, 361 beams)",
-        figure=1e3 * median_seconds(follow, scans),
-        unit="ms",
-        better="lower",
-        goal=1.0,
-        baseline="IDC, scan to scan (scipy)",
-        baseline_figure=1e3
-        * median_seconds(lambda pair: match(baseline, *pair), list(pairwise(scans[:100]))),
+    return Row.of_times(
+        "tracker, per scan (CSAIL, 361 beams)",
+        median_seconds(follow, scans),
+        1.0,
+        "IDC, scan to scan (scipy)",
+        median_seconds(lambda pair: match(baseline, *pair), list(pairwise(scans[:100]))),
     )
 
 

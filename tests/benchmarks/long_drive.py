@@ -50,22 +50,25 @@ def growth_along_a_drive(data: Path, *, quick: bool) -> list[Row]:
     """Rows for the cost of a scan and of a solution at some keyframes of one drive."""
     marks = (20, 40) if quick else (100, 300, 1000, 3000)
     stretches = _drive(_scans(data), marks, around=10 if quick else 50)
-    first = 1e3 * mean(stretches[marks[0]].scans_s)
+    first = mean(stretches[marks[0]].scans_s)
     rows = [_scan(mark, stretches[mark], marks[0], first) for mark in marks[1:]]
     solved = [(mark, s.solves) for mark, s in stretches.items() if s.solves]
     return rows + [_solution(mark, solves) for mark, solves in solved]
 
 
-def _scan(mark: int, stretch: Stretch, first_mark: int, first_ms: float) -> Row:
-    return Row(
-        name=f"scan, at keyframe {mark} of a drive, solving apart",
-        figure=1e3 * mean(stretch.scans_s),
-        unit="ms",
-        better="lower",
-        goal=round(1.5 * first_ms, 2),
-        baseline=f"at keyframe {first_mark}",
-        baseline_figure=first_ms,
-        note=f"mean of {len(stretch.scans_s)} scans",
+def solving_row(name: str, seconds: float, baseline_seconds: float, note: str) -> Row:
+    """How long it took to solve a graph, and how long the same graph takes gtsam."""
+    return Row.of_times(name, seconds, 10.0, "gtsam's Levenberg-Marquardt", baseline_seconds, note)
+
+
+def _scan(mark: int, stretch: Stretch, first_mark: int, first_s: float) -> Row:
+    return Row.of_times(
+        f"scan, at keyframe {mark} of a drive, solving apart",
+        mean(stretch.scans_s),
+        round(1.5 * 1e3 * first_s, 2),
+        f"at keyframe {first_mark}",
+        first_s,
+        f"mean of {len(stretch.scans_s)} scans",
     )
 
 
@@ -73,15 +76,11 @@ def _solution(mark: int, solves: list[tuple[float, Piece]]) -> Row:
     longest, piece = max(solves, key=lambda run: run[0])
     begin = process_time()
     levenberg_marquardt(piece, 0)
-    return Row(
-        name=f"graph, at keyframe {mark} of a drive, {int(piece.robust.sum())} loops",
-        figure=1e3 * longest,
-        unit="ms",
-        better="lower",
-        goal=10.0,
-        baseline="gtsam's Levenberg-Marquardt",
-        baseline_figure=1e3 * (process_time() - begin),
-        note=f"the longest of {len(solves)} within some keyframes",
+    return solving_row(
+        f"graph, at keyframe {mark} of a drive, {int(piece.robust.sum())} loops",
+        longest,
+        process_time() - begin,
+        f"the longest of {len(solves)} within some keyframes",
     )
 
 

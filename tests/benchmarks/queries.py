@@ -47,15 +47,13 @@ def queries(scans: list[Scan], *, quick: bool) -> list[Row]:
 
 
 def _row(when: str, p99: float, idle: float) -> Row:
-    return Row(
-        name=f"GET map, p99, {when} ({CONNECTIONS} connections)",
-        figure=1e3 * p99,
-        unit="ms",
-        better="lower",
-        goal=5e3 * idle,
-        baseline="the same, p50, idle",
-        baseline_figure=1e3 * idle,
-        note="wall clock; service, flood and the one who looks on the same cores",
+    return Row.of_times(
+        f"GET map, p99, {when} ({CONNECTIONS} connections)",
+        p99,
+        5e3 * idle,
+        "the same, p50, idle",
+        idle,
+        "wall clock; service, flood and the one who looks on the same cores",
     )
 
 

@@ -28,6 +28,21 @@ class Row:
     baseline_figure: float
     note: str = ""
 
+    @classmethod
+    def of_times(
+        cls,
+        name: str,
+        seconds: float,
+        goal_ms: float | None,
+        baseline: str,
+        baseline_seconds: float,
+        note: str = "",
+    ) -> Row:
+        """A time, shown in milliseconds."""
+        return cls(
+            name, 1e3 * seconds, "ms", "lower", goal_ms, baseline, 1e3 * baseline_seconds, note
+        )
+
     @property
     def ratio(self) -> float:
         """How many times better than the baseline."""

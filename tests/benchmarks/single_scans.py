@@ -55,12 +55,10 @@ def matching(data: Path, *, quick: bool) -> list[Row]:
 
 def _matching(name: str, pairs: list[ScanPair]) -> Row:
     matcher, baseline = LineMatcher(), AngleHistogramMatcher()
-    return Row(
-        name=name,
-        figure=1e3 * median_seconds(lambda pair: matcher.match(*pair), pairs, repeats=3),
-        unit="ms",
-        better="lower",
-        goal=0.4,
-        baseline="angle histograms (Weiss 1994, numpy)",
-        baseline_figure=1e3 * median_seconds(lambda pair: match(baseline, *pair), pairs[:50]),
+    return Row.of_times(
+        name,
+        median_seconds(lambda pair: matcher.match(*pair), pairs, repeats=3),
+        0.4,
+        "angle histograms (Weiss 1994, numpy)",
+        median_seconds(lambda pair: match(baseline, *pair), pairs[:50]),
     )

@@ -16,7 +16,7 @@ from lineloom_core.places import Place, PlaceIndex, recognise
 from lineloom_core.simulation import sick_lms200
 from lineloom_core.warm_up import warm_up
 
-from tests.benchmarks.long_drive import growth_along_a_drive
+from tests.benchmarks.long_drive import growth_along_a_drive, solving_row
 from tests.benchmarks.row import Row, median_seconds, table
 from tests.benchmarks.scans import DATA
 from tests.core.places.conftest import office_stretches
@@ -52,15 +52,13 @@ def _recognition(made: list[Place], size: int) -> Row:
     for k in sample:
         recognise(places[k], new[k % len(new)])
     brute = (process_time() - begin) / len(sample) * size
-    return Row(
-        name=f"place, new among {size}",
-        figure=1e3 * each,
-        unit="ms",
-        better="lower",
-        goal=150.0,
-        baseline="every place in full (from 60 pairs)",
-        baseline_figure=1e3 * brute,
-        note=f"a shortlist of {most}, each compared in full",
+    return Row.of_times(
+        f"place, new among {size}",
+        each,
+        150.0,
+        "every place in full (from 60 pairs)",
+        brute,
+        f"a shortlist of {most}, each compared in full",
     )
 
 
@@ -81,15 +79,11 @@ def _solving(size: int) -> Row:
     graph.add_edge(Edge("new", "loop", max(size - 101, 0), size - 1, newest, information, True))
     piece = graph.piece(0)
     ours = median_seconds(lambda _: _solve(graph, piece), range(5))
-    return Row(
-        name=f"graph, {size} keyframes solved after one more closure",
-        figure=1e3 * ours,
-        unit="ms",
-        better="lower",
-        goal=10.0,
-        baseline="gtsam's Levenberg-Marquardt",
-        baseline_figure=1e3 * median_seconds(lambda _: levenberg_marquardt(piece, 0), range(3)),
-        note="a loop at every fourth keyframe; not every keyframe asks for it",
+    return solving_row(
+        f"graph, {size} keyframes solved after one more closure",
+        ours,
+        median_seconds(lambda _: levenberg_marquardt(piece, 0), range(3)),
+        "a loop at every fourth keyframe; not every keyframe asks for it",
     )
 
 
