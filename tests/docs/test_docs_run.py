@@ -180,6 +180,8 @@ def test_the_commands_in_the_text(
     monkeypatch.chdir(folder)
     for name, value in environment(folder, stage.url, "text").items():
         monkeypatch.setenv(name, value)
+    # Completion is installed for the shell that it is called from: a test may have none.
+    monkeypatch.setattr("shellingham.detect_shell", lambda: ("bash", "/bin/bash"))
     run = {s.text for s in spans() if why_not(s, UNRUN_SPANS) is None}
     assert CliRunner().invoke(app, ["simulate", "--duration", "2"]).exit_code == 0
     assert CliRunner().invoke(app, ["floorplan", "put", "building.dxf"]).exit_code == 4
