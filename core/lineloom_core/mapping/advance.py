@@ -24,6 +24,9 @@ from lineloom_core.mapping.track import Track
 from lineloom_core.places import Place
 
 _CLOSURES_UNSOLVED = 6
+_KEYFRAMES_A_CLOSURE = 500
+"""Small closures wait until there are a few; in a large map, which takes long to solve, until there
+is one for so many keyframes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +64,8 @@ def _close_loops(site: SiteMap, keyframe: int) -> bool:
     root = site.component_root(keyframe)
     waiting = site.unsolved.pop(root, 0) + 1
     step = closed.checks["moved_m"] + 2.0 * closed.checks["turned_rad"]
-    if step < 0.05 and waiting < _CLOSURES_UNSOLVED:
+    enough = max(_CLOSURES_UNSOLVED, len(site.keyframes) // _KEYFRAMES_A_CLOSURE)
+    if step < 0.05 and waiting < enough:
         site.unsolved[root] = waiting
         return False  # it can wait for the next that says more
     site.optimise(keyframe)

@@ -17,10 +17,10 @@ from lineloom_core.mapping.keyframe import Keyframe
 from lineloom_core.mapping.memory import Memory
 
 
-def dumps(beliefs: Any, history: History, memory: Memory, config: MapperConfig) -> bytes:
-    """Return an object as bytes that need this history, memory and config to be read."""
+def dumps(beliefs: Any, memory: Memory, config: MapperConfig) -> bytes:
+    """Return an object as bytes that need its history, memory and config to be read."""
     file = io.BytesIO()
-    _Writer(file, history, {id(memory): "memory", id(config): "config"}).dump(beliefs)
+    _Writer(file, {id(memory): "memory", id(config): "config"}).dump(beliefs)
     return file.getvalue()
 
 
@@ -30,15 +30,14 @@ def loads(data: bytes, history: History, memory: Memory, config: MapperConfig) -
 
 
 class _Writer(pickle.Pickler):
-    def __init__(self, file: io.BytesIO, history: History, named: dict[int, str]) -> None:
+    def __init__(self, file: io.BytesIO, named: dict[int, str]) -> None:
         super().__init__(file, protocol=5)
-        self._history, self._named = history, named
+        self._named = named
 
     def persistent_id(self, obj: Any) -> Any:
         if not isinstance(obj, Keyframe):
             return self._named.get(id(obj))
-        fact = self._history[obj.id]
-        return obj.id if obj.step is fact.step else (obj.id, obj.step)
+        return (obj.id, obj.step) if obj.joined else obj.id
 
 
 class _Reader(pickle.Unpickler):
@@ -52,4 +51,4 @@ class _Reader(pickle.Unpickler):
         if isinstance(pid, int):
             return self._history[pid]
         keyframe, step = pid
-        return replace(self._history[keyframe], step=step)
+        return replace(self._history[keyframe], step=step, joined=True)

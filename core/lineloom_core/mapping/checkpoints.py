@@ -77,7 +77,7 @@ class Checkpoints:
         return site, self.history.since(begin)
 
     def _as_bytes(self, site: SiteMap) -> bytes:
-        return zlib.compress(dumps(site, self.history, self._memory, self._config), 1)
+        return zlib.compress(dumps(site, self._memory, self._config), 1)
 
     def _from_bytes(self, data: bytes) -> SiteMap:
         site = loads(zlib.decompress(data), self.history, self._memory, self._config)

@@ -45,13 +45,11 @@ def _compare(site: SiteMap, place: Place) -> dict[TrackPair, tuple[int, int]]:
     own = site.track(place.anchor).id
     near = sorted(
         (here.distance(site.pose(other.anchor)), other.id)
-        for other in site.places.values()
-        if site.track(other.anchor).id != own and site.same_component(other.anchor, place.anchor)
+        for other in site.places_around(place.anchor, site.config.places.span)
+        if site.track(other.anchor).id != own
     )
     news: dict[TrackPair, tuple[int, int]] = {}
-    for distance, number in near[: site.config.doubt.most_compared]:
-        if distance > site.config.places.span:
-            break
+    for _, number in near[: site.config.doubt.most_compared]:
         other = site.places[number]
         theirs = site.track(other.anchor).id
         matched, missing = _held_against(site, other, place)

@@ -63,6 +63,7 @@ class Keyframe:
     break that it belongs to. T_track_laser: where the tracker put it; the graph knows better.
     step: None for the first of a track. version: number of the log entry that brought it.
     trusted: False where its lidar's geometry is certainly wrong: no place is made of it.
+    joined: the step leads over keyframes that the map has let go.
     Features and cloud are functions of the scan: kept for the keyframes used last, made anew for
     the others.
     """
@@ -76,6 +77,7 @@ class Keyframe:
     version: int
     extraction: ExtractionConfig = field(repr=False)
     trusted: bool = True
+    joined: bool = False
 
     @cached_property
     def segments(self) -> NDArray[np.float64]:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from array import array
 
-import numpy as np
-
 from lineloom_core.geometry import Pose
-from lineloom_core.graph.growing import GrowingArray
 
 _NOTHING = -1
+_HERE = Pose.identity()
 
 
 class Resting:
@@ -19,13 +17,13 @@ class Resting:
     """
 
     def __init__(self) -> None:
-        self._holder = GrowingArray(np.int64)
-        self._poses = GrowingArray(np.float64, (3,))
+        self._holder = array("q")
+        self._poses = array("d")  # three each
         self._held_by: dict[int, array[int]] = {}
         self._count = 0
 
     def __contains__(self, keyframe: int) -> bool:
-        return keyframe < len(self._holder) and self._holder.rows[keyframe] != _NOTHING
+        return keyframe < len(self._holder) and self._holder[keyframe] != _NOTHING
 
     def __len__(self) -> int:
         return self._count
@@ -43,16 +41,17 @@ class Resting:
 
     def on(self, keyframe: int) -> tuple[int, Pose]:
         """What a keyframe rests on and T_holder_keyframe; itself if it was not let go."""
-        if keyframe not in self:
-            return keyframe, Pose.identity()
-        return int(self._holder.rows[keyframe]), self._pose(keyframe)
+        # Asked for every pose of the map: no function is called where nothing rests.
+        if keyframe >= len(self._holder) or self._holder[keyframe] == _NOTHING:
+            return keyframe, _HERE
+        return self._holder[keyframe], self._pose(keyframe)
 
     def _put(self, keyframe: int, holder: int, pose: Pose) -> None:
-        while len(self._holder) <= keyframe:
-            self._holder.append(_NOTHING)
-            self._poses.append(0.0)
-        self._holder.rows[keyframe] = holder
-        self._poses.rows[keyframe] = pose.to_array()
+        missing = keyframe + 1 - len(self._holder)
+        self._holder.extend([_NOTHING] * missing)
+        self._poses.extend([0.0] * (3 * missing))
+        self._holder[keyframe] = holder
+        self._poses[3 * keyframe : 3 * keyframe + 3] = array("d", (pose.x, pose.y, pose.theta))
 
     def _pose(self, keyframe: int) -> Pose:
-        return Pose(*self._poses.rows[keyframe].tolist())
+        return Pose(*self._poses[3 * keyframe : 3 * keyframe + 3])

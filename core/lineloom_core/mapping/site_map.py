@@ -208,6 +208,11 @@ class SiteMap:
         """Keyframes of the same component within `radius` m, nearest first, with distances."""
         return self.graph.within(keyframe, radius)
 
+    def places_around(self, keyframe: int, radius: float) -> list[Place]:
+        """Places of the component anchored within `radius` m of a keyframe, in their order."""
+        near = {k for k, _ in self.nearby(keyframe, radius)} | {keyframe}
+        return [p for p in self.places.values() if p.anchor in near]
+
     def let_go(self, runs: Sequence[Sequence[int]]) -> None:
         """Take runs of successive keyframes of a track each out of the map.
 
@@ -221,7 +226,7 @@ class SiteMap:
         for k in gone:
             del self.keyframes[k]
         for keyframe, step in over:
-            self.keyframes[keyframe] = replace(self.keyframes[keyframe], step=step)
+            self.keyframes[keyframe] = replace(self.keyframes[keyframe], step=step, joined=True)
             self.add_constraint(_tracked(keyframe, step))
 
     def _lay_to_rest(self, run: Sequence[int]) -> tuple[int, Step] | None:

@@ -186,9 +186,8 @@ class SiteMapper:
 
     def snapshot(self, known: int = 0) -> Snapshot:
         """The whole state, for `restore`, without the first `known` chapters of the history."""
-        beliefs = dumps(
-            (self._site, self._robots, self._version), self._history, self._memory, self._config
-        )
+        known_now = (self._site, self._robots, self._version)
+        beliefs = dumps(known_now, self._memory, self._config)
         state = (SNAPSHOT_FORMAT, self._config, self._history, self._memory, beliefs)
         return Snapshot(pickle.dumps(state, protocol=5), known, self._history.chapters(known))
 

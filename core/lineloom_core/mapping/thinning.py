@@ -40,16 +40,12 @@ def thin(site: SiteMap, place: Place) -> tuple[Place, ...]:
 
 def _alike(site: SiteMap, place: Place) -> list[Place]:
     """Step 1; the oldest first, the new one included."""
-    config, here = site.config.thinning, site.pose(place.anchor)
-    found = []
-    for p in site.places.values():
-        if not site.same_component(p.anchor, place.anchor):
-            continue
-        there = site.pose(p.anchor)
-        turned = abs(angle_difference(there.theta, here.theta))
-        if there.distance(here) <= config.radius and turned <= config.angle:
-            found.append(p)
-    return found
+    config, heading = site.config.thinning, site.pose(place.anchor).theta
+    return [
+        p
+        for p in site.places_around(place.anchor, config.radius)
+        if abs(angle_difference(site.pose(p.anchor).theta, heading)) <= config.angle
+    ]
 
 
 def _may_go(site: SiteMap, place: Place) -> bool:

@@ -27,9 +27,10 @@ def build_view(
 ) -> SiteView:
     """Compose the view of a version, with or without trajectories; changes nothing."""
     component_of = {k: site.component_id(k) for k in site.keyframes}
+    covariances = _Covariances(site)
     return SiteView(
         version=version,
-        robots={name: _robot(site, record, component_of) for name, record in robots.items()},
+        robots={n: _robot(site, r, component_of, covariances) for n, r in robots.items()},
         components=_components(site, component_of),
         merged_into=dict(site.merged_into),
         trajectories={n: trajectory_of(site, r) for n, r in robots.items()} if trajectories else {},
@@ -54,7 +55,9 @@ def _components(site: SiteMap, component_of: dict[int, str]) -> tuple[ComponentV
     )
 
 
-def _robot(site: SiteMap, record: RobotRecord, component_of: dict[int, str]) -> RobotView:
+def _robot(
+    site: SiteMap, record: RobotRecord, component_of: dict[int, str], covariances: _Covariances
+) -> RobotView:
     pose = covariance = component = None
     latest = record.latest
     if latest is not None:
@@ -62,7 +65,7 @@ def _robot(site: SiteMap, record: RobotRecord, component_of: dict[int, str]) -> 
         pose = site.pose(latest.keyframe) @ latest.T_keyframe_laser @ T_base_laser.inverse()
         holder, _ = site.resting.on(latest.keyframe)
         component = component_of[holder]
-        covariance = _covariance(site, holder)
+        covariance = covariances.of(holder)
     return RobotView(
         robot=record.name,
         component=component,
@@ -78,10 +81,19 @@ def _robot(site: SiteMap, record: RobotRecord, component_of: dict[int, str]) -> 
     )
 
 
-def _covariance(site: SiteMap, keyframe: int) -> NDArray[np.float64]:
-    """Covariance of a keyframe's pose against its component's anchor, in the map's axes."""
-    covariances = Covariances(site.graph.piece(keyframe), site.component_root(keyframe))
-    return in_map_axes(covariances.of(keyframe), site.pose(keyframe))
+class _Covariances:
+    """Covariances of keyframes' poses against their component's anchor, in the map's axes."""
+
+    def __init__(self, site: SiteMap) -> None:
+        self._site = site
+        self._factored: dict[int, Covariances] = {}
+
+    def of(self, keyframe: int) -> NDArray[np.float64]:
+        """Return a keyframe's, shape (3, 3); a component is factored once."""
+        root = self._site.component_root(keyframe)
+        if root not in self._factored:
+            self._factored[root] = Covariances(self._site.graph.piece(root), root)
+        return in_map_axes(self._factored[root].of(keyframe), self._site.pose(keyframe))
 
 
 def trajectory_of(site: SiteMap, record: RobotRecord) -> TrajectoryView:
