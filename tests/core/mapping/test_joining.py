@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from lineloom_core.geometry import Pose
 from lineloom_core.graph import chi_squared
+from lineloom_core.mapping import distinctive, joining
 from lineloom_core.mapping.changes import ComponentMerged
 from lineloom_core.mapping.config import JoinConfig, MapperConfig
 from lineloom_core.mapping.constraint import Constraint
@@ -103,6 +104,21 @@ def test_small_disagreement_is_averaged_not_refused(meeting: Meeting) -> None:
         meeting.candidate(i, Pose(*rng.normal(0.0, [0.03, 0.03, 0.005])))
     assert meeting.join() is not None
     assert meeting.worst_error() < 0.12
+
+
+def test_no_more_is_held_against_whole_maps_than_it_takes(
+    meeting: Meeting, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = [meeting.candidate(i, evidence=STRONG + i) for i in spread(meeting, 5)]
+    asked: list[str] = []
+
+    def is_distinctive(site: SiteMap, candidate: Constraint) -> bool:
+        asked.append(candidate.id)
+        return distinctive.is_distinctive(site, candidate)
+
+    monkeypatch.setattr(joining, "is_distinctive", is_distinctive)
+    assert meeting.join() is not None
+    assert set(asked) == {c.id for c in made[-CREDULOUS.join.least_distinctive :]}
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])
