@@ -12,13 +12,7 @@ import numpy as np
 from lineloom import wire
 from lineloom.wire.base import Covariance
 from lineloom_core.geometry import Pose
-from lineloom_core.mapping.site_view import (
-    ConstraintView,
-    MapLine,
-    RobotView,
-    SiteView,
-    TrajectoryView,
-)
+from lineloom_core.mapping.site_view import ConstraintView, MapLine, RobotView, SiteView
 from lineloom_core.matching import MatchResult
 from lineloom_core.scan import Mount, Scan
 from numpy.typing import NDArray
@@ -112,17 +106,25 @@ def to_uncertain_pose(robot: RobotView) -> wire.UncertainPose | None:
     return wire.UncertainPose(x=pose.x, y=pose.y, theta=pose.theta, covariance=covariance)
 
 
-def to_trajectory(robot: str, version: int, scans: TrajectoryView) -> wire.Trajectory:
+def to_trajectory(robot: str, view: SiteView) -> wire.Trajectory:
     """Return every processed scan, with its pose if it has one."""
+    found = view.trajectories.get(robot)
     poses: list[wire.TrajectoryPose] = []
-    for session, seq, stamp, component, pose in scans.rows():
-        x, y, theta = (None, None, None) if pose is None else pose
-        poses.append(
-            wire.TrajectoryPose.model_construct(
-                session=session, seq=seq, stamp=stamp, component=component, x=x, y=y, theta=theta
+    if found is not None:
+        for session, seq, stamp, component, pose in found.rows():
+            x, y, theta = (None, None, None) if pose is None else pose
+            poses.append(
+                wire.TrajectoryPose.model_construct(
+                    session=session,
+                    seq=seq,
+                    stamp=stamp,
+                    component=component,
+                    x=x,
+                    y=y,
+                    theta=theta,
+                )
             )
-        )
-    return wire.Trajectory.model_construct(robot=robot, version=version, poses=poses)
+    return wire.Trajectory.model_construct(robot=robot, version=view.version, poses=poses)
 
 
 def to_line(line: MapLine) -> wire.Line:

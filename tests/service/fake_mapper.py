@@ -27,7 +27,6 @@ from lineloom_core.mapping.answers import (
     MatchedLines,
     RobotMove,
     RunnerUp,
-    Trajectory,
     WhatIf,
 )
 from lineloom_core.mapping.changes import Changes
@@ -159,10 +158,7 @@ class FakeMapper:
         best = PoseHypothesis("c1", Pose(x, 0.5, 0.1), np.diag([0.01, 0.01, math.inf]), 0.9, checks)
         return Localisation("unique", "it fits", seen[-1], (best,))
 
-    def trajectory(self, robot: str) -> Trajectory:
-        return Trajectory(self._version, self._trajectory(robot))
-
-    def view(self, *, trajectories: bool = True) -> SiteView:
+    def view(self) -> SiteView:
         if self._latest == UNSEEN:
             raise ValueError("there is nothing to see")
         keyframes = tuple(self._keyframes())
@@ -176,7 +172,7 @@ class FakeMapper:
                 for c in components
             ),
             merged_into={"c9": "c1"},
-            trajectories={r: self._trajectory(r) for r in robots if trajectories},
+            trajectories={robot: self._trajectory(robot) for robot in robots},
             lines=tuple(self._lines(components)),
             keyframes=keyframes,
             constraints=tuple(self._constraints(keyframes)),
@@ -231,13 +227,13 @@ class FakeMapper:
         )
 
     def _trajectory(self, robot: str) -> TrajectoryView:
-        scans = self._scans.get(robot, [])
+        scans = self._scans[robot]
         return TrajectoryView(
             session=tuple(s for s, _, _ in scans),
             seq=np.array([n for _, n, _ in scans], dtype=np.int64),
             stamp=np.array([t for _, _, t in scans]),
             component=tuple(_component(robot) for _ in scans),
-            poses=np.array([[i + 1.0, 0.0, 0.0] for i in range(len(scans))]).reshape(-1, 3),
+            poses=np.array([[i + 1.0, 0.0, 0.0] for i in range(len(scans))]),
             unplaced=(UnplacedScan("0", 77, 99.5, 1),) if robot == "alone" else (),
         )
 

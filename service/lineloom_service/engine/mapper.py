@@ -16,7 +16,7 @@ from lineloom_service.store.records import LogEntry
 SITE_MAPPER = "lineloom_core.mapping.site_mapper:SiteMapper"
 """Where the mapper is; by name, so that the API process need not import gtsam."""
 
-QUESTIONS = frozenset({"what_if", "explain", "localise", "rays", "trajectory"})
+QUESTIONS = frozenset({"what_if", "explain", "localise", "rays"})
 """Methods of the mapper that answer and change nothing: what `Engine.ask` may name."""
 
 WARM_UP = "lineloom_core.warm_up:warm_up"
@@ -46,8 +46,8 @@ class Mapper(Protocol):
         """Take a retraction back."""
         ...
 
-    def view(self, *, trajectories: bool = True) -> SiteView:
-        """Return all that is known now, with or without trajectories."""
+    def view(self) -> SiteView:
+        """Return all that is known now."""
         ...
 
     def snapshot(self, known: int = 0) -> Snapshot:

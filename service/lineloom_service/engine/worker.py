@@ -268,7 +268,7 @@ class Worker:
         hosted.due = None
         self._current.mark(site, BUSY)
         try:
-            parts = hosted.encoder.encode(hosted.mapper.view(trajectories=False))
+            parts = hosted.encoder.encode(hosted.mapper.view())
         except Exception as error:
             # The site stays at its last view, and is not idle: that is the truth.
             _LOG.exception("site %d: no view after entry %d", site, hosted.position)

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-from dataclasses import replace
 from typing import Annotated
 
+import numpy as np
 from fastapi import APIRouter, Response
 from lineloom import wire
 from lineloom_core.io import csv, tum
-from lineloom_core.mapping.answers import Trajectory
+from lineloom_core.mapping.site_view import TrajectoryView
 
 from lineloom_service.answers import answer, format_choice, unknown_format
-from lineloom_service.asking import ask
 from lineloom_service.convert import to_trajectory
 from lineloom_service.dependencies import CurrentView, KnownRobot, KnownSite, ServiceDep
 from lineloom_service.map_frames import AlignQuery, FrameQuery, in_frame
@@ -20,6 +19,13 @@ from lineloom_service.openapi import also_as
 
 router = APIRouter(tags=["robots"])
 
+_NO_SCANS = TrajectoryView(
+    session=(),
+    seq=np.empty(0, dtype=np.int64),
+    stamp=np.empty(0),
+    component=(),
+    poses=np.empty((0, 3)),
+)
 _TEXT = {
     "tum": (tum.write_trajectory, "text/plain"),
     "csv": (csv.write_trajectory, "text/csv"),
@@ -46,15 +52,11 @@ async def get_trajectory(
 
     In the floor plan's frame: of scans in components that have a place there.
     """
-    if format not in ("json", *_TEXT):
-        raise unknown_format(format, ("json", *_TEXT))
-    found: Trajectory = await ask(service, site, "trajectory", robot.name)
-    view = replace(view, trajectories={robot.name: found.scans})
-    framed = (await in_frame(service, site, view, align=align, frame=frame)).view
-    scans = framed.trajectories[robot.name]
+    view = (await in_frame(service, site, view, align=align, frame=frame)).view
     if format == "json":
-        written = await asyncio.to_thread(to_trajectory, robot.name, found.version, scans)
-        return answer(written)
+        return answer(to_trajectory(robot.name, view))
+    if format not in _TEXT:
+        raise unknown_format(format, ("json", *_TEXT))
     write, media_type = _TEXT[format]
-    text = await asyncio.to_thread(write, scans)
+    text = await asyncio.to_thread(write, view.trajectories.get(robot.name, _NO_SCANS))
     return Response(text, media_type=media_type)
