@@ -174,6 +174,8 @@ async def test_map_formats(client: httpx.AsyncClient) -> None:
     geojson = await _get(client, "/map", format="geojson")
     assert geojson.headers["content-type"] == "application/geo+json"
     assert geojson.json()["type"] == "FeatureCollection"
+    kinds = {feature["properties"]["kind"] for feature in geojson.json()["features"]}
+    assert kinds >= {"wall", "trajectory", "robot"}
     problem = await _expect_refusal(client, f"{SITE}/map", 422, "unknown-format", format="bmp")
     assert (
         problem["detail"]

@@ -54,6 +54,10 @@ class PoseGraph:
         """Edge by id, in order of insertion (read only)."""
         return MappingProxyType(self._edges)
 
+    def estimates(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Ids of all nodes (n,) and their pose estimates (n, 3), as copies."""
+        return self._ids.rows.copy(), self._poses.rows.copy()
+
     def pose(self, node: int) -> Pose:
         """Pose estimate of a node. Raises KeyError for an unknown one."""
         return Pose(*self._poses.rows[self._row_of[node]].tolist())

@@ -8,17 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from lineloom_core.mapping.site_view import TrajectoryView
-
 Action = Literal["retract", "restore"]
-
-
-@dataclass(frozen=True, slots=True)
-class Trajectory:
-    """Where a robot has been, as known at a version."""
-
-    version: int
-    scans: TrajectoryView
 
 
 @dataclass(frozen=True, slots=True)

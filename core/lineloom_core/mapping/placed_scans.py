@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from lineloom_core.geometry import Pose
 from lineloom_core.graph.growing import GrowingArray
 
+BLOCK = 1024
+"""Scans in a block; small enough for the last one to be written again with every view."""
+
 
 @dataclass(frozen=True, slots=True)
 class PlacedScan:
@@ -22,19 +25,38 @@ class PlacedScan:
     T_keyframe_laser: Pose
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class ScanBlock:
+    """Up to `BLOCK` placed scans one after another, in columns of n; a full one never changes.
+
+    session: number of each scan's in `sessions`. steps: (n, 3), T_keyframe_laser as x, y, theta.
+    """
+
+    sessions: tuple[str, ...]
+    session: NDArray[np.int32]
+    seq: NDArray[np.int64]
+    stamp: NDArray[np.float64]
+    keyframe: NDArray[np.int64]
+    steps: NDArray[np.float64]
+
+
 class PlacedScans:
-    """Columns, not objects: every scan for ever has a row, of 56 bytes."""
+    """Columns, not objects: every scan for ever has a row, of 52 bytes."""
 
     def __init__(self) -> None:
+        self._full: list[ScanBlock] = []
         self._names: dict[str, int] = {}
-        self._session = GrowingArray(np.int64)
+        self._begin()
+
+    def _begin(self) -> None:
+        self._session = GrowingArray(np.int32)
         self._seq = GrowingArray(np.int64)
         self._stamp = GrowingArray(np.float64)
         self._keyframe = GrowingArray(np.int64)
         self._steps = GrowingArray(np.float64, (3,))
 
     def __len__(self) -> int:
-        return len(self._seq)
+        return BLOCK * len(self._full) + len(self._seq)
 
     def append(self, scan: PlacedScan) -> None:
         """Add one."""
@@ -44,33 +66,20 @@ class PlacedScans:
         self._stamp.append(scan.stamp)
         self._keyframe.append(scan.keyframe)
         self._steps.append((T.x, T.y, T.theta))
+        if len(self._seq) == BLOCK:
+            self._full.append(self._last())
+            self._begin()
 
-    @property
-    def sessions(self) -> tuple[str, ...]:
-        """Session of each scan."""
-        return names_of(list(self._names), self._session.rows)
+    def blocks(self) -> tuple[ScanBlock, ...]:
+        """All scans; full blocks are the same objects each time."""
+        return (*self._full, self._last()) if len(self._seq) else tuple(self._full)
 
-    @property
-    def seq(self) -> NDArray[np.int64]:
-        """Sequence number of each scan, shape (n,); a copy."""
-        return self._seq.rows.copy()
-
-    @property
-    def stamps(self) -> NDArray[np.float64]:
-        """Stamp of each scan on its robot's clock [s], shape (n,); a copy."""
-        return self._stamp.rows.copy()
-
-    @property
-    def keyframes(self) -> NDArray[np.int64]:
-        """Keyframe that each scan is fixed to, shape (n,)."""
-        return self._keyframe.rows
-
-    @property
-    def steps(self) -> NDArray[np.float64]:
-        """T_keyframe_laser of each scan as x, y, theta, shape (n, 3)."""
-        return self._steps.rows
-
-
-def names_of(names: list[str], numbers: NDArray[np.int64]) -> tuple[str, ...]:
-    """The name for each number."""
-    return tuple(np.array(names, dtype=object)[numbers].tolist()) if names else ()
+    def _last(self) -> ScanBlock:
+        return ScanBlock(
+            tuple(self._names),
+            self._session.rows.copy(),
+            self._seq.rows.copy(),
+            self._stamp.rows.copy(),
+            self._keyframe.rows.copy(),
+            self._steps.rows.copy(),
+        )

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from array import array
 
+import numpy as np
+from numpy.typing import NDArray
+
 from lineloom_core.geometry import Pose
 
 _NOTHING = -1
@@ -45,6 +48,12 @@ class Resting:
         if keyframe >= len(self._holder) or self._holder[keyframe] == _NOTHING:
             return keyframe, _HERE
         return self._holder[keyframe], self._pose(keyframe)
+
+    def rows(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+        """Ids of all that rest, ascending, of what they rest on, and T_holder_keyframe, (n, 3)."""
+        holder = np.array(self._holder, dtype=np.int64)
+        resting = np.flatnonzero(holder != _NOTHING)
+        return resting, holder[resting], np.array(self._poses).reshape(-1, 3)[resting]
 
     def _put(self, keyframe: int, holder: int, pose: Pose) -> None:
         missing = keyframe + 1 - len(self._holder)

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 
 from lineloom_core.fusion.occupancy import Rays
 from lineloom_core.mapping.advance import advance
-from lineloom_core.mapping.answers import Action, Evidence, Trajectory, WhatIf
+from lineloom_core.mapping.answers import Action, Evidence, WhatIf
 from lineloom_core.mapping.by_reference import dumps, loads
 from lineloom_core.mapping.changes import Changes
 from lineloom_core.mapping.checkpoints import Checkpoints
@@ -37,7 +37,7 @@ from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.mapping.site_view import SiteView
 from lineloom_core.mapping.snapshot import Snapshot, SnapshotError
 from lineloom_core.mapping.verdicts import Verdicts
-from lineloom_core.mapping.view_builder import build_view, trajectory_of
+from lineloom_core.mapping.view_builder import build_view
 from lineloom_core.mapping.what_if import what_if
 from lineloom_core.scan import Mount, Scan
 
@@ -172,17 +172,9 @@ class SiteMapper:
         """Return what the lidars saw as free, for an occupancy grid; changes nothing."""
         return component_rays(self._site, component)
 
-    def view(self, *, trajectories: bool = True) -> SiteView:
-        """Everything there is to know at this version; changes nothing.
-
-        Without trajectories it costs in proportion to the map, with them to all scans ever taken.
-        """
-        return build_view(self._site, self._robots, self._version, trajectories=trajectories)
-
-    def trajectory(self, robot: str) -> Trajectory:
-        """Every scan of a robot with its pose, none of one that is not known; changes nothing."""
-        record = self._robots.get(robot, RobotRecord(robot))
-        return Trajectory(self._version, trajectory_of(self._site, record))
+    def view(self) -> SiteView:
+        """Everything there is to know at this version; changes nothing."""
+        return build_view(self._site, self._robots, self._version)
 
     def snapshot(self, known: int = 0) -> Snapshot:
         """The whole state, for `restore`, without the first `known` chapters of the history."""

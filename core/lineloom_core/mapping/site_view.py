@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -169,14 +169,14 @@ class SiteView:
 
     version: number of log entries processed; grows with every one, so it is the same again after
     a replay. merged_into: component id -> id of the survivor, for components that were absorbed.
-    trajectories: by robot; none in a view that was asked for without: they grow with every scan.
+    trajectories: by robot, of all robots (put together when asked for, see `trajectories`).
     """
 
     version: int
     robots: dict[str, RobotView]
     components: tuple[ComponentView, ...]
     merged_into: dict[str, str]
-    trajectories: dict[str, TrajectoryView]
+    trajectories: Mapping[str, TrajectoryView]
     lines: tuple[MapLine, ...]
     keyframes: tuple[KeyframeView, ...]
     constraints: tuple[ConstraintView, ...]

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lineloom_core.geometry.angles import wrap_array
 from lineloom_core.graph import Covariances, in_map_axes
 from lineloom_core.mapping.map_lines import fused_lines
-from lineloom_core.mapping.placed_scans import names_of
 from lineloom_core.mapping.robot_record import RobotRecord
 from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.mapping.site_view import (
@@ -18,14 +16,12 @@ from lineloom_core.mapping.site_view import (
     RobotView,
     SiteView,
     SubmapView,
-    TrajectoryView,
 )
+from lineloom_core.mapping.trajectories import Trajectories, Way, Whereabouts, compose
 
 
-def build_view(
-    site: SiteMap, robots: dict[str, RobotRecord], version: int, *, trajectories: bool
-) -> SiteView:
-    """Compose the view of a version, with or without trajectories; changes nothing."""
+def build_view(site: SiteMap, robots: dict[str, RobotRecord], version: int) -> SiteView:
+    """Compose the view of a version; changes nothing."""
     component_of = {k: site.component_id(k) for k in site.keyframes}
     covariances = _Covariances(site)
     return SiteView(
@@ -33,7 +29,7 @@ def build_view(
         robots={n: _robot(site, r, component_of, covariances) for n, r in robots.items()},
         components=_components(site, component_of),
         merged_into=dict(site.merged_into),
-        trajectories={n: trajectory_of(site, r) for n, r in robots.items()} if trajectories else {},
+        trajectories=_trajectories(site, robots, component_of),
         lines=fused_lines(site, component_of),
         keyframes=_keyframes(site, component_of),
         constraints=_constraints(site),
@@ -96,33 +92,34 @@ class _Covariances:
         return in_map_axes(self._factored[root].of(keyframe), self._site.pose(keyframe))
 
 
-def trajectory_of(site: SiteMap, record: RobotRecord) -> TrajectoryView:
-    """Every scan of a robot with its pose now; takes time with their number."""
-    placed = record.placed
-    keyframes, of = np.unique(placed.keyframes, return_inverse=True)
-    anchors = np.array([site.pose(k).to_array() for k in keyframes.tolist()]).reshape(-1, 3)
-    components = [site.component_id(k) for k in keyframes.tolist()]
-    base = record.mount.T_base_laser.inverse().to_array()
-    in_map = _compose(anchors[of], placed.steps)
-    return TrajectoryView(
-        session=placed.sessions,
-        seq=placed.seq,
-        stamp=placed.stamps,
-        component=names_of(components, of),
-        poses=_compose(in_map, np.broadcast_to(base, in_map.shape)),
-        unplaced=tuple(record.unplaced),
+def _trajectories(
+    site: SiteMap, robots: dict[str, RobotRecord], component_of: dict[int, str]
+) -> Trajectories:
+    blocks = {name: record.placed.blocks() for name, record in robots.items()}
+    return Trajectories(
+        ways={
+            name: Way(
+                len(blocks[name]), tuple(record.unplaced), record.mount.T_base_laser.inverse()
+            )
+            for name, record in robots.items()
+        },
+        blocks=tuple(block for own in blocks.values() for block in own),
+        keyframes=_whereabouts(site, component_of),
     )
 
 
-def _compose(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    c, s = np.cos(a[:, 2]), np.sin(a[:, 2])
-    return np.column_stack(
-        [
-            a[:, 0] + c * b[:, 0] - s * b[:, 1],
-            a[:, 1] + s * b[:, 0] + c * b[:, 1],
-            wrap_array(a[:, 2] + b[:, 2]),
-        ]
-    )
+def _whereabouts(site: SiteMap, component_of: dict[int, str]) -> Whereabouts:
+    """Poses of all keyframes ever, in a few steps for all of them at once."""
+    ids, kept = site.graph.estimates()
+    resting, holders, T_holder_resting = site.resting.rows()
+    count = 1 + max(ids.max(initial=-1), resting.max(initial=-1))
+    poses, component = np.full((count, 3), np.nan), np.full(count, -1, dtype=np.int32)
+    names = {name: number for number, name in enumerate(dict.fromkeys(component_of.values()))}
+    poses[ids] = kept
+    component[ids] = [names[component_of[k]] for k in ids.tolist()]
+    poses[resting] = compose(poses[holders], T_holder_resting)
+    component[resting] = component[holders]
+    return Whereabouts(poses, component, tuple(names))
 
 
 def _keyframes(site: SiteMap, component_of: dict[int, str]) -> tuple[KeyframeView, ...]:

@@ -10,16 +10,21 @@ from __future__ import annotations
 
 import pickle
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.trajectories import Trajectories
 
 T = TypeVar("T")
 
-COLLECTIONS = ("lines", "keyframes", "constraints", "submaps")
-"""The fields that grow with the map and are tuples of many objects."""
+_FIELDS = ("lines", "keyframes", "constraints", "submaps")
+"""Those that grow with the map and are tuples of many objects."""
+
+_SCANS = "scans"
+COLLECTIONS = (*_FIELDS, _SCANS)
+"""What of a view travels part by part: these fields, and what trajectories are made of."""
 
 _SPELL_S, _BREATH_S = 0.0005, 0.0005
 """So long objects are read before others get the interpreter, and so long they have it."""
@@ -35,9 +40,25 @@ def with_breaths(parts: Iterable[T]) -> Iterator[T]:
             begin = time.perf_counter()
 
 
+def collections_of(view: SiteView) -> dict[str, tuple[object, ...]]:
+    """Return the parts of a view, by collection."""
+    parts: dict[str, tuple[object, ...]] = {name: getattr(view, name) for name in _FIELDS}
+    made = view.trajectories
+    return {**parts, _SCANS: made.blocks if isinstance(made, Trajectories) else ()}
+
+
+def with_collections(view: SiteView, parts: Mapping[str, tuple[object, ...]]) -> SiteView:
+    """Return the view with these parts in place of its own."""
+    fields: dict[str, Any] = {name: parts[name] for name in _FIELDS}
+    if isinstance(view.trajectories, Trajectories):
+        blocks: tuple[Any, ...] = parts[_SCANS]
+        fields["trajectories"] = replace(view.trajectories, blocks=blocks)
+    return replace(view, **fields)
+
+
 def without_collections(view: SiteView) -> SiteView:
     """Return what does not grow part by part."""
-    return replace(view, lines=(), keyframes=(), constraints=(), submaps=())
+    return with_collections(view, dict.fromkeys(COLLECTIONS, ()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,9 +86,9 @@ class ViewEncoder:
         sent: dict[bytes, int] = {}
         numbers: dict[str, list[int]] = {}
         new: dict[int, bytes] = {}
-        for name in COLLECTIONS:
+        for name, parts in collections_of(view).items():
             numbers[name] = []
-            for part in getattr(view, name):
+            for part in parts:
                 body = pickle.dumps(part, protocol=5)
                 number = self._sent.get(body, sent.get(body))
                 if number is None:
@@ -95,4 +116,4 @@ class ViewDecoder:
         collections = {
             name: tuple(known[n] for n in numbers) for name, numbers in encoded.numbers.items()
         }
-        return replace(rest, **collections)  # type: ignore[arg-type]
+        return with_collections(rest, collections)

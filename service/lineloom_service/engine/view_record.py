@@ -13,7 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lineloom_service.engine.published import Published
-from lineloom_service.engine.view_parts import COLLECTIONS, with_breaths, without_collections
+from lineloom_service.engine.view_parts import (
+    COLLECTIONS,
+    collections_of,
+    with_breaths,
+    with_collections,
+    without_collections,
+)
 from lineloom_service.store.records import ViewRecord
 
 
@@ -31,9 +37,8 @@ def write_view(published: Published) -> ViewRecord:
     """Return what goes into the store. Takes time with the map's size: for a thread."""
     bodies: list[bytes] = []
     lengths: dict[str, NDArray[np.uint32]] = {}
-    for name in COLLECTIONS:
-        parts = with_breaths(getattr(published.view, name))
-        written = [pickle.dumps(part, protocol=5) for part in parts]
+    for name, parts in collections_of(published.view).items():
+        written = [pickle.dumps(part, protocol=5) for part in with_breaths(parts)]
         lengths[name] = np.array([len(body) for body in written], dtype=np.uint32)
         bodies += written
     rest = replace(published, view=without_collections(published.view))
@@ -58,7 +63,7 @@ class ViewReader:
                 raise TypeError("it is something else")
             rest: Published = pickle.loads(whole.rest)
             collections = self._read(whole)
-            view = replace(rest.view, **collections)  # type: ignore[arg-type]
+            view = with_collections(rest.view, collections)
         except Exception as error:
             raise ValueError(f"unreadable view: {error}") from error
         return replace(rest, view=view)

@@ -54,9 +54,9 @@ async def get_trajectory(
     """
     view = (await in_frame(service, site, view, align=align, frame=frame)).view
     if format == "json":
-        return answer(to_trajectory(robot.name, view))
+        return await asyncio.to_thread(lambda: answer(to_trajectory(robot.name, view)))
     if format not in _TEXT:
         raise unknown_format(format, ("json", *_TEXT))
     write, media_type = _TEXT[format]
-    text = await asyncio.to_thread(write, view.trajectories.get(robot.name, _NO_SCANS))
+    text = await asyncio.to_thread(lambda: write(view.trajectories.get(robot.name, _NO_SCANS)))
     return Response(text, media_type=media_type)

@@ -6,7 +6,6 @@ import os
 import pickle
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -119,19 +118,6 @@ def test_a_snapshot_without_its_chapters_is_named(log: list[SimulatedScan]) -> N
             SiteMapper.restore(Snapshot(whole.state, 0, chapters))
     with pytest.raises(SnapshotError):
         SiteMapper.restore(mapper.snapshot(known=1))
-
-
-def test_trajectories_asked_for_are_those_of_the_view(log: list[SimulatedScan]) -> None:
-    mapper = mapped(log[:150])
-    view, without = mapper.view(), mapper.view(trajectories=False)
-    assert without.trajectories == {}
-    assert fingerprint(replace(view, trajectories={})) == fingerprint(without)
-    assert set(view.trajectories) == {"robot-1", "robot-2"}
-    for name, shown in view.trajectories.items():
-        asked = mapper.trajectory(name)
-        assert asked.version == view.version
-        assert list(asked.scans.rows()) == list(shown.rows())
-    assert list(mapper.trajectory("nobody").scans.rows()) == []
 
 
 def test_a_fresh_process_with_other_hashes_ends_with_the_same_bits(
