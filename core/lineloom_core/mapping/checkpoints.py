@@ -1,9 +1,9 @@
 """What was believed earlier: going through the history again need not begin at its beginning.
 
-A verdict on a constraint changes nothing that was believed before both of its keyframes were
-there, so beliefs of that time can be taken up again under other verdicts, bit by bit the same as
-made anew. Kept are beliefs as bytes, the older the sparser: their number grows with the logarithm
-of the history. A cache: without any of them all comes out the same, later.
+A verdict on a constraint changes nothing that was believed before both of its keyframes were there,
+so beliefs of that time can be taken up again under other verdicts, bit by bit the same as made
+anew. Kept are beliefs as bytes on the disk, the older the sparser: their number grows with the
+logarithm of the history. A cache: without any of them all comes out the same, later.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from lineloom_core.mapping.history import History
 from lineloom_core.mapping.keyframe import Keyframe
 from lineloom_core.mapping.memory import Memory
 from lineloom_core.mapping.site_map import SiteMap
+from lineloom_core.mapping.spool import Spool, Spooled
 from lineloom_core.mapping.verdicts import Verdicts
 
 _THINNER = 4
@@ -28,7 +29,7 @@ _THINNER = 4
 class _Checkpoint:
     number: int
     next_keyframe: int
-    data: bytes
+    data: Spooled
 
 
 class Checkpoints:
@@ -39,6 +40,7 @@ class Checkpoints:
         self._config = config
         self._memory = memory
         self._kept: list[_Checkpoint] = []
+        self._spool = Spool()
         self._made = 0
 
     def __len__(self) -> int:
@@ -47,7 +49,7 @@ class Checkpoints:
     def copy(self) -> Checkpoints:
         """The same, to try something with."""
         other = Checkpoints(self._config, self.history, self._memory)
-        other._kept, other._made = list(self._kept), self._made
+        other._kept, other._made, other._spool = list(self._kept), self._made, self._spool
         return other
 
     def note(self, site: SiteMap, keyframe: int) -> None:
@@ -58,7 +60,8 @@ class Checkpoints:
         last = self._kept[-1].next_keyframe if self._kept else 0
         if keyframe + 1 - last < max(self._config.checkpoint_every, len(site.keyframes) // 4):
             return
-        self._kept.append(_Checkpoint(self._made, keyframe + 1, self._as_bytes(site)))
+        data = Spooled(self._spool, self._as_bytes(site))
+        self._kept.append(_Checkpoint(self._made, keyframe + 1, data))
         self._made += 1
         self._kept = [c for c in self._kept if _stays(c.number, self._made - c.number)]
 
@@ -72,7 +75,7 @@ class Checkpoints:
             site = SiteMap(self._config, self._memory, verdicts)
             return site, self.history.since(0)
         begin = self._kept[-1].next_keyframe
-        site = self._from_bytes(self._kept[-1].data)
+        site = self._from_bytes(self._kept[-1].data.read())
         site.verdicts = verdicts
         return site, self.history.since(begin)
 

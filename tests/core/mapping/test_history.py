@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 from lineloom_core.features import ExtractionConfig
 from lineloom_core.geometry import Pose
+from lineloom_core.mapping import spool as spool_module
 from lineloom_core.mapping.chapter import Chapter
 from lineloom_core.mapping.history import History
 from lineloom_core.mapping.keyframe import Keyframe, Step
 from lineloom_core.mapping.memory import Memory
-from lineloom_core.mapping.spool import Spool
+from lineloom_core.mapping.spool import Spool, Spooled
 from lineloom_core.places import Recognition, RecognitionConfig
 from lineloom_core.scan import Scan
 
@@ -181,11 +182,37 @@ def test_later_chapters_follow_the_earlier_ones() -> None:
 def test_a_spool_gives_back_what_it_took() -> None:
     spool = Spool()
     blocks = [bytes([k]) * (1000 * k) for k in range(20)]
-    for block in blocks:
-        spool.append(block)
+    assert [spool.append(block) for block in blocks] == list(range(20))
     assert [spool[k] for k in (*range(20), 3)] == [*blocks, blocks[3]]
-    with pytest.raises(IndexError):
+    assert len(spool) == 20
+    with pytest.raises(KeyError):
         spool[20]
+
+
+def test_a_spool_uses_its_room_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spool_module, "_LITTLE", 0)
+    rng = np.random.default_rng(2)
+    spool, twin = Spool(), dict[int, bytes]()
+    for step in range(300):
+        block = bytes([step % 256]) * int(rng.integers(1, 500))
+        twin[spool.append(block)] = block
+        while len(twin) > 10:
+            number = int(rng.choice(list(twin)))
+            del twin[number]
+            spool.discard(number)
+        assert {number: spool[number] for number in twin} == twin
+        assert spool._file is not None
+        assert spool._file.seek(0, 2) <= 2 * sum(map(len, twin.values())) + 500
+
+
+def test_a_block_goes_with_the_last_who_holds_it() -> None:
+    spool = Spool()
+    first, second = Spooled(spool, b"first"), Spooled(spool, b"second")
+    also = first
+    del first
+    assert (also.read(), second.read(), len(spool)) == (b"first", b"second", 2)
+    del also
+    assert len(spool) == 1
 
 
 def test_a_full_disk_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -200,3 +227,5 @@ def test_a_full_disk_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.undo()
     spool.append(b"after")
     assert [spool[k] for k in range(3)] == [b"before", b"while", b"after"]
+    spool.discard(1)
+    assert [spool[k] for k in (0, 2)] == [b"before", b"after"]
