@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lineloom_core.geometry import Pose
-from lineloom_core.geometry.angles import wrap_array
+from lineloom_core.graph import se2
 from lineloom_core.mapping.placed_scans import ScanBlock
 from lineloom_core.mapping.site_view import TrajectoryView, UnplacedScan
 
@@ -59,7 +59,7 @@ class Trajectories(Mapping[str, TrajectoryView]):
         """Put a robot's trajectory together; takes time with its length."""
         way, blocks = self.ways[robot], self._blocks_of(robot)
         keyframe = np.concatenate([_NO_IDS, *(b.keyframe for b in blocks)])
-        laser = compose(
+        laser = se2.compose(
             self.keyframes.poses[keyframe], np.concatenate([_NO_POSES, *(b.steps for b in blocks)])
         )
         base = np.broadcast_to(way.T_laser_base.to_array(), laser.shape)
@@ -68,7 +68,7 @@ class Trajectories(Mapping[str, TrajectoryView]):
             seq=np.concatenate([_NO_IDS, *(b.seq for b in blocks)]),
             stamp=np.concatenate([_NO_STAMPS, *(b.stamp for b in blocks)]),
             component=_named(self.keyframes.components, self.keyframes.component[keyframe]),
-            poses=compose(laser, base),
+            poses=se2.compose(laser, base),
             unplaced=way.unplaced,
         )
 
@@ -83,18 +83,6 @@ class Trajectories(Mapping[str, TrajectoryView]):
 
 _NO_IDS: NDArray[np.int64] = np.empty(0, dtype=np.int64)
 _NO_STAMPS, _NO_POSES = np.empty(0), np.empty((0, 3))
-
-
-def compose(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Poses a @ b, row by row, shape (n, 3)."""
-    c, s = np.cos(a[:, 2]), np.sin(a[:, 2])
-    return np.column_stack(
-        [
-            a[:, 0] + c * b[:, 0] - s * b[:, 1],
-            a[:, 1] + s * b[:, 0] + c * b[:, 1],
-            wrap_array(a[:, 2] + b[:, 2]),
-        ]
-    )
 
 
 def _named(names: tuple[str, ...], numbers: NDArray[np.int32]) -> tuple[str, ...]:

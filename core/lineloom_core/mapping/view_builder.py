@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lineloom_core.graph import Covariances, in_map_axes
+from lineloom_core.graph import Covariances, in_map_axes, se2
 from lineloom_core.mapping.map_lines import fused_lines
 from lineloom_core.mapping.robot_record import RobotRecord
 from lineloom_core.mapping.site_map import SiteMap
@@ -17,7 +17,7 @@ from lineloom_core.mapping.site_view import (
     SiteView,
     SubmapView,
 )
-from lineloom_core.mapping.trajectories import Trajectories, Way, Whereabouts, compose
+from lineloom_core.mapping.trajectories import Trajectories, Way, Whereabouts
 
 
 def build_view(site: SiteMap, robots: dict[str, RobotRecord], version: int) -> SiteView:
@@ -117,7 +117,7 @@ def _whereabouts(site: SiteMap, component_of: dict[int, str]) -> Whereabouts:
     names = {name: number for number, name in enumerate(dict.fromkeys(component_of.values()))}
     poses[ids] = kept
     component[ids] = [names[component_of[k]] for k in ids.tolist()]
-    poses[resting] = compose(poses[holders], T_holder_resting)
+    poses[resting] = se2.compose(poses[holders], T_holder_resting)
     component[resting] = component[holders]
     return Whereabouts(poses, component, tuple(names))
 
