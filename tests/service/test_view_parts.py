@@ -48,6 +48,24 @@ def _written(view: SiteView) -> dict[str, list[bytes]]:
     }
 
 
+def _with_a_wall_moved(view: SiteView) -> SiteView:
+    lines = list(view.lines)
+    lines[1] = replace(lines[1], x1=99.0)
+    return replace(view, lines=tuple(lines))
+
+
+def _assert_only_the_wall_is_new(first: SiteView, second: SiteView) -> None:
+    assert second.lines == _with_a_wall_moved(first).lines
+    of_first, of_second = collections_of(first), collections_of(second)
+    assert of_first["scans"]
+    assert all(
+        one is other
+        for name in COLLECTIONS
+        for one, other in zip(of_first[name], of_second[name], strict=True)
+        if other is not second.lines[1]
+    )
+
+
 def _travelled(view: SiteView, encoder: ViewEncoder, decoder: ViewDecoder) -> SiteView:
     return decoder.decode(pickle.loads(pickle.dumps(encoder.encode(view))))
 
@@ -67,20 +85,10 @@ def test_what_has_not_changed_is_not_sent_again_and_stays_the_same_object(
 ) -> None:
     encoder, decoder = ViewEncoder(), ViewDecoder()
     first = _travelled(views[0], encoder, decoder)
-    moved = replace(views[0].lines[1], x1=99.0)
-    lines = (views[0].lines[0], moved, *views[0].lines[2:])
-    parts = encoder.encode(replace(views[0], lines=lines))
+    parts = encoder.encode(_with_a_wall_moved(views[0]))
     assert len(parts.new) == 1
     second = decoder.decode(parts)
-    assert second.lines[1] == moved
-    of_first, of_second = collections_of(first), collections_of(second)
-    assert of_first["scans"]
-    assert all(
-        one is other
-        for name in COLLECTIONS
-        for one, other in zip(of_first[name], of_second[name], strict=True)
-        if other is not second.lines[1]
-    )
+    _assert_only_the_wall_is_new(first, second)
 
 
 def test_what_is_gone_is_kept_at_neither_end(views: tuple[SiteView, SiteView]) -> None:
@@ -110,18 +118,9 @@ def test_what_a_stored_view_has_of_the_one_before_stays_the_same_object(
 ) -> None:
     reader = ViewReader()
     first = reader.read(write_view(Published(1, 1, 0, views[0]))).view
-    moved = replace(views[0].lines[1], x1=99.0)
-    lines = (views[0].lines[0], moved, *views[0].lines[2:])
-    second = reader.read(write_view(Published(2, 2, 0, replace(views[0], lines=lines)))).view
-    assert second.lines[1] == moved
-    of_first, of_second = collections_of(first), collections_of(second)
-    assert of_first["scans"]
-    assert all(
-        one is other
-        for name in COLLECTIONS
-        for one, other in zip(of_first[name], of_second[name], strict=True)
-        if other is not second.lines[1]
-    )
+    moved = _with_a_wall_moved(views[0])
+    second = reader.read(write_view(Published(2, 2, 0, moved))).view
+    _assert_only_the_wall_is_new(first, second)
     reader.read(write_view(Published(3, 3, 0, EMPTY_VIEW)))
     assert reader._known == {}
 
