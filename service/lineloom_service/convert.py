@@ -12,7 +12,7 @@ import numpy as np
 from lineloom import wire
 from lineloom.wire.base import Covariance
 from lineloom_core.geometry import Pose
-from lineloom_core.mapping.site_view import ConstraintView, MapLine, RobotView, SiteView
+from lineloom_core.mapping.answers.site_view import ConstraintView, MapLine, RobotView, SiteView
 from lineloom_core.matching import MatchResult
 from lineloom_core.scan import Mount, Scan
 from numpy.typing import NDArray

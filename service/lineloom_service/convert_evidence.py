@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from lineloom import wire
-from lineloom_core.mapping.answers import Evidence, WhatIf
-from lineloom_core.mapping.localisation import Localisation
-from lineloom_core.mapping.site_view import ConstraintView
+from lineloom_core.mapping.answers.evidence import Evidence, WhatIf
+from lineloom_core.mapping.answers.localisation import Localisation
+from lineloom_core.mapping.answers.site_view import ConstraintView
 
 from lineloom_service.convert import figures, matrix, to_constraint
 

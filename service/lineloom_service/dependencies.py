@@ -9,7 +9,7 @@ from typing import Annotated
 
 from fastapi import Depends, Path, Request
 from lineloom.wire import ID_PATTERN
-from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.answers.site_view import SiteView
 
 from lineloom_service.errors import UNKNOWN_ROBOT, UNKNOWN_SITE, ProblemError
 from lineloom_service.security.scopes import scope_of

@@ -14,7 +14,7 @@ from lineloom_core.floorplan.fit import Judge
 from lineloom_core.floorplan.plan import FloorPlan
 from lineloom_core.floorplan.registration import Registration, follow, judge_of, register
 from lineloom_core.fusion.occupancy import Rays, rasterise
-from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.answers.site_view import SiteView
 from numpy.typing import NDArray
 
 from lineloom_service.store.files import FileRecord

@@ -16,7 +16,7 @@ from lineloom_core.fusion.occupancy import (
 from lineloom_core.geometry import Pose
 from lineloom_core.io import csv, dxf, geojson, ieee1873, nav2, png, svg
 from lineloom_core.io.selection import BBox, check_bbox
-from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.answers.site_view import SiteView
 
 from lineloom_service.answers import JSON
 from lineloom_service.asking import ask

@@ -10,7 +10,7 @@ from lineloom.wire.export import MapFrame
 from lineloom_core.floorplan.alignment import aligning
 from lineloom_core.geometry import Pose
 from lineloom_core.io.reframe import in_frames, only
-from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.answers.site_view import SiteView
 
 from lineloom_service import __version__
 from lineloom_service.errors import (

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from lineloom_core.geometry import Pose
-from lineloom_core.mapping.site_view import ConstraintView, RobotView, SiteView
+from lineloom_core.mapping.answers.site_view import ConstraintView, RobotView, SiteView
 from numpy.typing import NDArray
 
 

@@ -6,7 +6,7 @@ import asyncio
 import logging
 
 import lineloom_core
-from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.answers.site_view import SiteView
 
 from lineloom_service.body_budget import BodyBudget
 from lineloom_service.engine.conductor import Conductor

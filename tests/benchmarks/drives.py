@@ -10,12 +10,12 @@ from time import perf_counter, process_time
 from lineloom import Client
 from lineloom.cli.child_service import ChildService
 from lineloom_core.features import extract_features
+from lineloom_core.mapping.facts.tracker import Tracker
 from lineloom_core.mapping.site_mapper import SiteMapper
-from lineloom_core.mapping.tracker import Tracker
-from lineloom_core.matching.baselines import IdcMatcher
 from lineloom_core.matching.interface import match
 from lineloom_core.matching.local_map import Cloud
 from lineloom_core.scan import Scan
+from lineloom_lab.baselines import IdcMatcher
 
 from tests.benchmarks.row import Row, median_seconds
 from tests.benchmarks.scans import csail, driven_seconds

@@ -18,11 +18,11 @@ from unittest import mock
 from lineloom_core.graph import Piece
 from lineloom_core.graph.solver import levenberg_marquardt
 from lineloom_core.io.carmen import read_carmen
+from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.config import MapperConfig, ThinningConfig
-from lineloom_core.mapping.site_map import SiteMap
 from lineloom_core.mapping.site_mapper import SiteMapper
 from lineloom_core.scan import Scan
-from lineloom_core.simulation import SimulatedRobot, office_floor, sick_lms200
+from lineloom_lab.simulation import SimulatedRobot, office_floor, sick_lms200
 
 from tests.benchmarks.row import Row
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from lineloom_core.fusion.occupancy import Rays, rasterise
-from lineloom_core.simulation import Fleet
+from lineloom_lab.simulation import Fleet
 from numpy.typing import NDArray
 
 from tests.benchmarks.row import Row, median_seconds

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from lineloom import Client
 from lineloom.cli.child_service import ChildService
-from lineloom_core.simulation import Fleet, Lidar, sick_lms200
+from lineloom_lab.simulation import Fleet, Lidar, sick_lms200
 
 from tests.benchmarks.environment import environment
 from tests.benchmarks.row import Row, table

@@ -6,11 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from lineloom_core.evaluation import load_pairs
-from lineloom_core.evaluation.simulated_pairs import simulated_pairs
 from lineloom_core.io.carmen import read_carmen
 from lineloom_core.scan import Scan
-from lineloom_core.simulation import FreeSpace, Lidar, office_floor, sick_lms200
+from lineloom_lab.evaluation import load_pairs
+from lineloom_lab.evaluation.simulated_pairs import simulated_pairs
+from lineloom_lab.simulation import FreeSpace, Lidar, office_floor, sick_lms200
 
 ScanPair = tuple[Scan, Scan]
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from lineloom_core.features import ExtractionConfig, extract_features
 from lineloom_core.matching import LineMatcher
-from lineloom_core.matching.baselines import AngleHistogramMatcher
 from lineloom_core.matching.interface import match
 from lineloom_core.scan import Scan
-from lineloom_core.simulation import Lidar, scanner_360, sick_lms200
+from lineloom_lab.baselines import AngleHistogramMatcher
+from lineloom_lab.simulation import Lidar, scanner_360, sick_lms200
 
 from tests.benchmarks.row import Row, median_seconds
 from tests.benchmarks.scans import ScanPair, office_pairs, office_scans, real_pairs

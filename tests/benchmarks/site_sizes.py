@@ -16,7 +16,7 @@ from pathlib import Path
 
 from lineloom import Client
 from lineloom.cli.child_service import ChildService
-from lineloom_core.simulation import Lidar, scanner_360, sick_lms200
+from lineloom_lab.simulation import Lidar, scanner_360, sick_lms200
 
 from tests.benchmarks.environment import environment
 from tests.benchmarks.restart import SITE, drive, seconds_away

@@ -13,8 +13,8 @@ from lineloom_core.graph import Edge, Piece, PoseGraph, settle
 from lineloom_core.graph.solver import levenberg_marquardt
 from lineloom_core.mapping.config import PlaceConfig
 from lineloom_core.places import Place, PlaceIndex, recognise
-from lineloom_core.simulation import sick_lms200
 from lineloom_core.warm_up import warm_up
+from lineloom_lab.simulation import sick_lms200
 
 from tests.benchmarks.long_drive import growth_along_a_drive, solving_row
 from tests.benchmarks.row import Row, median_seconds, table

@@ -19,7 +19,7 @@ from lineloom import Client
 from lineloom.cli.child_service import ChildService
 from lineloom.retry import RetryPolicy
 from lineloom_core.scan import Scan
-from lineloom_core.simulation import Fleet, sick_lms200
+from lineloom_lab.simulation import Fleet, sick_lms200
 
 from tests.benchmarks.environment import environment
 from tests.benchmarks.restart import seconds_away

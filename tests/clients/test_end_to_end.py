@@ -14,7 +14,7 @@ from lineloom import AsyncClient, Client, InvalidRequestError, NotFoundError, Ou
 from lineloom.cli.app import app
 from lineloom.cli.child_service import ChildService
 from lineloom.wire import MountSettings
-from lineloom_core.simulation import Fleet, SimulatedScan, rooms, sick_lms200
+from lineloom_lab.simulation import Fleet, SimulatedScan, rooms, sick_lms200
 from typer.testing import CliRunner
 
 SCANS = 60

@@ -15,9 +15,10 @@ from lineloom_core.io.map_drawing import draw_map
 from lineloom_core.io.map_layout import Panel, lay_out
 from lineloom_core.io.png import to_png
 from lineloom_core.io.selection import select
+from lineloom_core.mapping.answers.site_view import ConstraintView, SiteView
+from lineloom_core.mapping.belief.constraint_state import ConstraintState
 from lineloom_core.mapping.site_mapper import SiteMapper
-from lineloom_core.mapping.site_view import ConstraintState, ConstraintView, SiteView
-from lineloom_core.simulation import Fleet, rooms, scanner_360
+from lineloom_lab.simulation import Fleet, rooms, scanner_360
 
 from tests.docs.pages import ROOT
 

@@ -23,7 +23,7 @@ from lineloom.cli.app import app
 from lineloom.cli.child_service import ChildService
 from lineloom.wire import AnyEvent
 from lineloom_core.scan import Scan
-from lineloom_core.simulation import Fleet, rooms, scanner_360
+from lineloom_lab.simulation import Fleet, rooms, scanner_360
 from typer.testing import CliRunner
 
 from tests.docs import shell

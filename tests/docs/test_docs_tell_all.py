@@ -130,8 +130,8 @@ def test_every_finding_of_the_sensor_doctor() -> None:
 @pytest.mark.parametrize(
     ("module", "function"),
     [
-        ("mapping/joining.py", "_objection_to_set"),
-        ("mapping/overlap.py", "objection"),
+        ("mapping/merging/joining.py", "_objection_to_set"),
+        ("mapping/merging/overlap.py", "objection"),
         ("places/recognition.py", "_objection"),
     ],
 )

@@ -25,16 +25,16 @@ UNRUN = (
     Unrun(r"docker |export LINELOOM_DB_PASSWORD", 8, "no Docker engine where this is tested"),
     Unrun(r"cd |ros2 |colcon ", 4, "no ROS where this is tested"),
     Unrun(r"pip install ", 2, "would fetch the released package in place of this checkout's"),
-    Unrun(r"\S+python -m lineloom_core.evaluation.calibration", 1, "fits for many minutes"),
-    Unrun(r"\S+lineloom bench pairs", 1, "minutes on real pairs; tests/core/evaluation has it"),
+    Unrun(r"\S+python -m lineloom_lab.evaluation.calibration", 1, "fits for many minutes"),
+    Unrun(r"\S+lineloom bench pairs", 1, "minutes on real pairs; tests/lab/evaluation has it"),
 )
 
 UNRUN_SPANS = (
     Unrun(r".*(…|[A-Z]{2,}|\bA B\b)", None, "a placeholder, not a command"),
     Unrun(r"lineloom serve", None, "runs in the blocks"),
     Unrun(r"lineloom demo", None, "tests/clients/cli/test_demo.py runs it"),
-    Unrun(r"lineloom bench", None, "minutes; tests/core/evaluation runs parts"),
-    Unrun(r"lineloom experiment", None, "minutes; tests/core/experiments runs them"),
+    Unrun(r"lineloom bench", None, "minutes; tests/lab/evaluation runs parts"),
+    Unrun(r"lineloom experiment", None, "minutes; tests/lab/experiments runs them"),
 )
 """Likewise of the commands within the text, which come and go: none is counted."""
 

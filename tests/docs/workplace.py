@@ -20,7 +20,7 @@ from ezdxf.filemanagement import new
 from lineloom.scan_like import to_wire
 from lineloom_core.io.jsonl import ScanRecord, write_jsonl
 from lineloom_core.scan import Scan
-from lineloom_core.simulation import Fleet, World, sick_lms200
+from lineloom_lab.simulation import Fleet, World, sick_lms200
 
 from tests.core.io.bags import SCAN, Entry, Messages, write_bag
 from tests.docs.pages import ROOT

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lineloom_core.evaluation import trajectory_error
 from lineloom_core.io.carmen import read_carmen
 from lineloom_core.scan import Scan
+from lineloom_lab.evaluation import trajectory_error
 from numpy.typing import NDArray
 
 DATA = Path(__file__).parents[3] / "shared" / "data"

@@ -17,7 +17,7 @@ from lineloom.cli.child_service import ChildService
 from lineloom.cli.player import Player
 from lineloom.cli.simulate import due
 from lineloom_core.geometry import Pose
-from lineloom_core.simulation import Fleet
+from lineloom_lab.simulation import Fleet
 from PIL import Image
 
 pytestmark = pytest.mark.scenario

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pytest
+from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_core.mapping.site_mapper import SiteMapper
-from lineloom_core.mapping.site_view import SiteView
 from lineloom_core.scan import Scan
 
 from tests.scenarios import tinyslam

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from lineloom_core.fusion.occupancy import Rays
 from lineloom_core.geometry import Pose
-from lineloom_core.mapping.answers import (
+from lineloom_core.mapping.answers.evidence import (
     Evidence,
     Limit,
     MatchedLines,
@@ -29,19 +29,19 @@ from lineloom_core.mapping.answers import (
     RunnerUp,
     WhatIf,
 )
-from lineloom_core.mapping.changes import Changes
-from lineloom_core.mapping.localisation import Localisation, PoseHypothesis
-from lineloom_core.mapping.site_view import (
+from lineloom_core.mapping.answers.localisation import Localisation, PoseHypothesis
+from lineloom_core.mapping.answers.site_view import (
     ComponentView,
     ConstraintView,
     KeyframeView,
     MapLine,
     RobotView,
     SiteView,
-    StateChange,
     TrajectoryView,
-    UnplacedScan,
 )
+from lineloom_core.mapping.belief.constraint_state import StateChange
+from lineloom_core.mapping.changes import Changes
+from lineloom_core.mapping.facts.unplaced_scan import UnplacedScan
 from lineloom_core.mapping.snapshot import Snapshot
 from lineloom_core.scan import Mount, Scan
 

@@ -8,7 +8,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 
 import numpy as np
-from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_core.scan import Scan
 from lineloom_service.engine.conductor import Conductor
 from lineloom_service.engine.local_engine import LocalEngine

@@ -17,9 +17,9 @@ from typing import Any
 import httpx
 import pytest
 from lineloom_core.io.jsonl import ScanRecord, record_to_json
-from lineloom_core.mapping.site_view import SiteView
-from lineloom_core.simulation import Fleet
+from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_core.warm_up import warm_up
+from lineloom_lab.simulation import Fleet
 from lineloom_service.engine.mapper import SITE_MAPPER, Mapper, apply, load
 from lineloom_service.store.records import LogEntry
 from lineloom_service.store.sql_store import SqlStore

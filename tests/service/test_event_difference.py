@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from lineloom import wire
 from lineloom_core.geometry import Pose
-from lineloom_core.mapping.site_view import (
+from lineloom_core.mapping.answers.site_view import (
     ComponentView,
     ConstraintView,
     KeyframeView,

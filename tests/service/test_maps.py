@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from lineloom import wire
 from lineloom_core.io.selection import BBox, select
-from lineloom_core.mapping.site_view import ComponentView, MapLine, SiteView
+from lineloom_core.mapping.answers.site_view import ComponentView, MapLine, SiteView
 from lineloom_service.convert import to_line
 from lineloom_service.engine.published import EMPTY_VIEW
 from lineloom_service.maps.line_history import LineHistory

@@ -9,9 +9,9 @@ from dataclasses import replace
 from itertools import islice
 
 import pytest
+from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_core.mapping.site_mapper import SiteMapper
-from lineloom_core.mapping.site_view import SiteView
-from lineloom_core.simulation import Fleet
+from lineloom_lab.simulation import Fleet
 from lineloom_service.engine import view_parts
 from lineloom_service.engine.local_engine import LocalEngine
 from lineloom_service.engine.published import EMPTY_VIEW, Published

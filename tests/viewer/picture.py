@@ -9,7 +9,7 @@ from pathlib import Path
 
 from lineloom import Client
 from lineloom.cli.child_service import ChildService
-from lineloom_core.simulation import Fleet, rooms, scanner_360
+from lineloom_lab.simulation import Fleet, rooms, scanner_360
 from PIL import Image
 from playwright.sync_api import sync_playwright
 

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_core.mapping.site_mapper import SiteMapper
-from lineloom_core.mapping.site_view import SiteView
-from lineloom_core.simulation import Fleet, rooms, scanner_360
+from lineloom_lab.simulation import Fleet, rooms, scanner_360
 from lineloom_service.events.difference import events_between
 from playwright.sync_api import Page
 

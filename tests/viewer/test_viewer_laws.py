@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from lineloom_core.mapping.site_mapper import SiteMapper
-from lineloom_core.simulation import Fleet, rooms, scanner_360
+from lineloom_lab.simulation import Fleet, rooms, scanner_360
 from playwright.sync_api import Page
 
 from tests.viewer.fake_server import FakeServer

@@ -8,7 +8,7 @@ import pytest
 from lineloom import Client
 from lineloom.cli.child_service import ChildService
 from lineloom.scan_like import to_wire
-from lineloom_core.simulation import Fleet, SimulatedScan, rooms, scanner_360
+from lineloom_lab.simulation import Fleet, SimulatedScan, rooms, scanner_360
 from playwright.sync_api import Page, expect
 
 from tests.viewer.viewer_page import COMPONENTS, expect_components, open_viewer, wait_drawn

@@ -6,7 +6,7 @@ import csv
 import io
 
 from lineloom_core.io.selection import BBox, select
-from lineloom_core.mapping.site_view import SiteView, TrajectoryView
+from lineloom_core.mapping.answers.site_view import SiteView, TrajectoryView
 
 MAP_COLUMNS = (
     *("id", "component", "x1", "y1", "x2", "y2"),

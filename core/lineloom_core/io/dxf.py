@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from lineloom_core.io.drawing import robot_colour
 from lineloom_core.io.selection import BBox, ComponentContent, select
-from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.answers.site_view import SiteView
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lineloom_core.io.drawing import FRAME, INK, MUTED, Box, Disc, Drawing, Label, Mark, Strokes
-from lineloom_core.mapping.answers import Evidence, Limit
-from lineloom_core.mapping.site_view import ConstraintView
+from lineloom_core.mapping.answers.evidence import Evidence, Limit
+from lineloom_core.mapping.answers.site_view import ConstraintView
 
 REFERENCE, CURRENT, CONFLICT, MATCHED = "#0072b2", "#d55e00", "#c81e1e", "#009e73"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lineloom_core.mapping.site_view import ConstraintView, KeyframeView, SiteView
+from lineloom_core.mapping.answers.site_view import ConstraintView, KeyframeView, SiteView
 
 
 def write_graph(view: SiteView) -> str:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from lineloom_core.io.selection import BBox, ComponentContent, select
-from lineloom_core.mapping.site_view import MapLine, SiteView
+from lineloom_core.mapping.answers.site_view import MapLine, SiteView
 
 _NOTE = (
     "Coordinates are metres in the map frame of the feature's component, x forward, y left; "

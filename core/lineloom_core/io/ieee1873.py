@@ -17,7 +17,7 @@ from itertools import combinations_with_replacement
 from xml.etree import ElementTree as ET
 
 from lineloom_core.io.selection import BBox, ComponentContent, select
-from lineloom_core.mapping.site_view import MapLine, SiteView
+from lineloom_core.mapping.answers.site_view import MapLine, SiteView
 
 _PARAMETERS = ("rho", "alpha", "psi_a", "psi_b")
 _END_SIGMA_M = 0.1

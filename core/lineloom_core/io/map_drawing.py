@@ -24,7 +24,7 @@ from lineloom_core.io.drawing import (
 )
 from lineloom_core.io.map_layout import MARGIN, PANEL_PADDING, Panel, lay_out
 from lineloom_core.io.selection import BBox, ComponentContent, clip, select
-from lineloom_core.mapping.site_view import MapLine, SiteView
+from lineloom_core.mapping.answers.site_view import MapLine, SiteView
 
 DEFAULT_WIDTH_PX = 1600
 

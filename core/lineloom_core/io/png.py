@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw, ImageFont
 from lineloom_core.io.drawing import PAPER, Box, Disc, Drawing, Label, Mark, Strokes
 from lineloom_core.io.map_drawing import DEFAULT_WIDTH_PX, draw_map
 from lineloom_core.io.selection import BBox
-from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.answers.site_view import SiteView
 
 MAX_WIDTH_PX = 8000
 """Wider pictures take gigabytes to draw; the SVG scales to any size."""

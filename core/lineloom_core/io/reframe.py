@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lineloom_core.geometry import Pose
 from lineloom_core.geometry.angles import wrap_array
-from lineloom_core.mapping.site_view import (
+from lineloom_core.mapping.answers.site_view import (
     KeyframeView,
     MapLine,
     RobotView,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lineloom_core.mapping.site_view import (
+from lineloom_core.mapping.answers.site_view import (
     ComponentView,
     MapLine,
     RobotView,

@@ -8,7 +8,7 @@ from xml.sax.saxutils import escape, quoteattr
 from lineloom_core.io.drawing import PAPER, Box, Disc, Drawing, Label, Mark, Strokes
 from lineloom_core.io.map_drawing import draw_map
 from lineloom_core.io.selection import BBox
-from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.answers.site_view import SiteView
 
 
 def render_map(view: SiteView, component: str | None = None, bbox: BBox | None = None) -> str:

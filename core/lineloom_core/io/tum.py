@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from lineloom_core.mapping.site_view import TrajectoryView
+from lineloom_core.mapping.answers.site_view import TrajectoryView
 
 
 def write_trajectory(trajectory: TrajectoryView) -> str:

@@ -11,16 +11,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from lineloom_core.mapping.candidates import consider
-from lineloom_core.mapping.changes import ComponentMerged
-from lineloom_core.mapping.closing import close_nearby
-from lineloom_core.mapping.constraint import Constraint
-from lineloom_core.mapping.contradictions import contradicted_by
-from lineloom_core.mapping.keyframe import Keyframe
-from lineloom_core.mapping.place_making import place_is_due, recent_keyframes
-from lineloom_core.mapping.site_map import SiteMap
-from lineloom_core.mapping.thinning import thin
-from lineloom_core.mapping.track import Track
+from lineloom_core.mapping.belief.constraint import Constraint
+from lineloom_core.mapping.belief.place_making import place_is_due, recent_keyframes
+from lineloom_core.mapping.belief.site_map import SiteMap
+from lineloom_core.mapping.belief.thinning import thin
+from lineloom_core.mapping.belief.track import Track
+from lineloom_core.mapping.facts.keyframe import Keyframe
+from lineloom_core.mapping.merging.candidates import consider
+from lineloom_core.mapping.merging.component_merged import ComponentMerged
+from lineloom_core.mapping.merging.contradictions import contradicted_by
+from lineloom_core.mapping.merging.near_loops import close_nearby
 from lineloom_core.places import Place
 
 _CLOSURES_UNSOLVED = 6
@@ -52,6 +52,11 @@ def advance(site: SiteMap, keyframe: Keyframe) -> Advance:
     if not contradicted:
         thin(site, place)
     return Advance(tuple(merges), optimised or moved, contradicted)
+
+
+def contradicted_by_next(site: SiteMap, keyframe: Keyframe) -> tuple[Constraint, ...]:
+    """Take the next keyframe of the history; what it shows to be wrong (for `rebuild`)."""
+    return advance(site, keyframe).contradicted
 
 
 def _close_loops(site: SiteMap, keyframe: int) -> bool:

@@ -4,14 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-
-@dataclass(frozen=True, slots=True)
-class ComponentMerged:
-    """`absorbed` became part of `survivor` because of the constraints named."""
-
-    survivor: str
-    absorbed: str
-    constraints: tuple[str, ...]
+from lineloom_core.mapping.merging.component_merged import ComponentMerged
 
 
 @dataclass(frozen=True, slots=True)

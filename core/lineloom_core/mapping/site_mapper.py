@@ -16,29 +16,29 @@ import pickle
 from collections.abc import Sequence
 
 from lineloom_core.fusion.occupancy import Rays
-from lineloom_core.mapping.advance import advance
-from lineloom_core.mapping.answers import Action, Evidence, WhatIf
-from lineloom_core.mapping.by_reference import dumps, loads
+from lineloom_core.mapping.advance import advance, contradicted_by_next
+from lineloom_core.mapping.answers.evidence import Action, Evidence, WhatIf
+from lineloom_core.mapping.answers.explain import explain
+from lineloom_core.mapping.answers.localisation import Localisation
+from lineloom_core.mapping.answers.localise import localise
+from lineloom_core.mapping.answers.ray_source import component_rays
+from lineloom_core.mapping.answers.site_view import SiteView
+from lineloom_core.mapping.answers.view_builder import build_view
+from lineloom_core.mapping.answers.what_if import what_if
+from lineloom_core.mapping.belief.by_reference import dumps, loads
+from lineloom_core.mapping.belief.checkpoints import Checkpoints
+from lineloom_core.mapping.belief.constraint import Constraint
+from lineloom_core.mapping.belief.memory import Memory
+from lineloom_core.mapping.belief.rebuild import first_affected, rebuild
+from lineloom_core.mapping.belief.site_map import SiteMap
+from lineloom_core.mapping.belief.verdicts import Verdicts
 from lineloom_core.mapping.changes import Changes
-from lineloom_core.mapping.checkpoints import Checkpoints
 from lineloom_core.mapping.config import MapperConfig
-from lineloom_core.mapping.constraint import Constraint
-from lineloom_core.mapping.explain import explain
-from lineloom_core.mapping.front_end import take
-from lineloom_core.mapping.history import History
-from lineloom_core.mapping.keyframe import Keyframe
-from lineloom_core.mapping.localisation import Localisation
-from lineloom_core.mapping.localise import localise
-from lineloom_core.mapping.memory import Memory
-from lineloom_core.mapping.ray_source import component_rays
-from lineloom_core.mapping.rebuild import first_affected, rebuild
-from lineloom_core.mapping.robot_record import RobotRecord
-from lineloom_core.mapping.site_map import SiteMap
-from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.facts.front_end import take
+from lineloom_core.mapping.facts.history import History
+from lineloom_core.mapping.facts.keyframe import Keyframe
+from lineloom_core.mapping.facts.robot_record import RobotRecord
 from lineloom_core.mapping.snapshot import Snapshot, SnapshotError
-from lineloom_core.mapping.verdicts import Verdicts
-from lineloom_core.mapping.view_builder import build_view
-from lineloom_core.mapping.what_if import what_if
 from lineloom_core.scan import Mount, Scan
 
 SNAPSHOT_FORMAT = 10
@@ -88,7 +88,7 @@ class SiteMapper:
             if taken.distrusted
             else self._advance(taken.keyframe, started=taken.started)
         )
-        self._history.seal(self._memory)
+        self._history.seal(self._memory.hand_over)
         return changes
 
     def _advance(self, keyframe: Keyframe, *, started: bool) -> Changes:
@@ -238,4 +238,4 @@ class SiteMapper:
         first = [first_affected(moved)] if (moved := self._site.verdicts.moved(verdicts)) else []
         if affected is not None:
             first.append(affected)
-        return rebuild(checkpoints, verdicts, min(first, default=0))
+        return rebuild(checkpoints, verdicts, min(first, default=0), contradicted_by_next)

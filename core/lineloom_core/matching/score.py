@@ -3,7 +3,7 @@
 Two questions, two logistic models of the checks' figures: are its rotation and its position across
 the walls right (`family`: the hypothesis and all its slides along them), and if so, is it the right
 one of these slides? The score is the product. Both are fitted on simulated pairs only
-(`python -m lineloom_core.evaluation.calibration`), so that no real data set has been tuned on.
+(`python -m lineloom_lab.evaluation.calibration`), so that no real data set has been tuned on.
 """
 
 from __future__ import annotations

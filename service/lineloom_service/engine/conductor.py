@@ -12,7 +12,7 @@ import logging
 from typing import Any
 
 import lineloom_core
-from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.answers.site_view import SiteView
 
 from lineloom_service.engine.forwarding import Forwarding
 from lineloom_service.engine.protocol import Engine, Recorder

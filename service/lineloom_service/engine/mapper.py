@@ -5,8 +5,8 @@ from __future__ import annotations
 import importlib
 from typing import Any, Protocol
 
+from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_core.mapping.changes import Changes
-from lineloom_core.mapping.site_view import SiteView
 from lineloom_core.mapping.snapshot import Snapshot
 from lineloom_core.scan import Mount, Scan
 

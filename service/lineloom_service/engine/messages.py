@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_core.mapping.snapshot import Snapshot
 
 from lineloom_service.engine.view_parts import ViewParts

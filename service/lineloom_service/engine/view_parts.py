@@ -14,8 +14,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-from lineloom_core.mapping.site_view import SiteView
-from lineloom_core.mapping.trajectories import Trajectories
+from lineloom_core.mapping.answers.site_view import SiteView
+from lineloom_core.mapping.answers.trajectories import Trajectories
 
 T = TypeVar("T")
 

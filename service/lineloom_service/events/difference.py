@@ -8,7 +8,7 @@ from typing import Literal
 
 from lineloom import wire
 from lineloom.wire.constraint import ConstraintState
-from lineloom_core.mapping.site_view import (
+from lineloom_core.mapping.answers.site_view import (
     ComponentView,
     ConstraintView,
     MapLine,

@@ -13,7 +13,7 @@ import time
 from dataclasses import dataclass
 
 from lineloom import wire
-from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.answers.site_view import SiteView
 
 from lineloom_service.events.codec import Told, encode, pack
 from lineloom_service.events.difference import events_between

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from lineloom_core.mapping.site_view import MapLine, SiteView
+from lineloom_core.mapping.answers.site_view import MapLine, SiteView
 
 _VERSIONS = 1_000
 """Versions back to which a difference can be told."""

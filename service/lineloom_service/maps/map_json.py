@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from lineloom import wire
 from lineloom_core.io.selection import BBox, clip
-from lineloom_core.mapping.site_view import ComponentView, MapLine, SiteView
+from lineloom_core.mapping.answers.site_view import ComponentView, MapLine, SiteView
 
 from lineloom_service.convert import to_line
 from lineloom_service.maps.line_history import LineTable

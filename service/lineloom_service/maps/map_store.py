@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from lineloom_core.io.selection import BBox
-from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.answers.site_view import SiteView
 
 from lineloom_service.maps.line_history import LineHistory
 from lineloom_service.maps.map_json import write_line, write_map

@@ -7,7 +7,7 @@ from collections import Counter as Tally
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.answers.site_view import SiteView
 from prometheus_client import CollectorRegistry, Counter, Gauge, Info
 from prometheus_client import Histogram as PrometheusHistogram
 from prometheus_client.core import GaugeMetricFamily, HistogramMetricFamily

@@ -11,8 +11,8 @@ from lineloom import wire
 from lineloom.wire.constraint import ConstraintKind, ConstraintState
 from lineloom_core.io.evidence_drawing import draw_evidence
 from lineloom_core.io.svg import to_svg
-from lineloom_core.mapping.answers import Evidence, WhatIf
-from lineloom_core.mapping.site_view import ConstraintView, SiteView
+from lineloom_core.mapping.answers.evidence import Evidence, WhatIf
+from lineloom_core.mapping.answers.site_view import ConstraintView, SiteView
 
 from lineloom_service.answers import (
     JSON,

@@ -10,7 +10,7 @@ import time
 from fastapi import APIRouter, Request, Response
 from lineloom import wire
 from lineloom_core.io.selection import check_bbox
-from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.answers.site_view import SiteView
 from pydantic import ValidationError
 
 from lineloom_service.answers import answer, matches

@@ -15,7 +15,7 @@ from lineloom_core.io.floorplan_drawing import draw_differences
 from lineloom_core.io.floorplan_files import PlanFormat, read_plan
 from lineloom_core.io.png import to_png
 from lineloom_core.io.svg import to_svg
-from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.answers.site_view import SiteView
 
 from lineloom_service.answers import answer, format_choice, unknown_format
 from lineloom_service.dependencies import CurrentView, KnownSite, ServiceDep

@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Response
 from lineloom import wire
 from lineloom_core.io import g2o
-from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.answers.site_view import SiteView
 
 from lineloom_service.answers import JSON, IfNoneMatch, format_choice, matches, unknown_format
 from lineloom_service.convert import to_graph

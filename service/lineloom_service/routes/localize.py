@@ -7,7 +7,7 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 from lineloom import wire
 from lineloom.wire.scan import STRICT_JSON
-from lineloom_core.mapping.localisation import Localisation
+from lineloom_core.mapping.answers.localisation import Localisation
 from lineloom_core.scan import InvalidScanError, Scan
 from pydantic import ValidationError
 

@@ -9,7 +9,7 @@ from urllib.parse import urlencode
 from fastapi import APIRouter, Query, Request, Response
 from lineloom import wire
 from lineloom.wire.base import MAX_COUNTER
-from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.answers.site_view import SiteView
 
 from lineloom_service.answers import (
     JSON,

@@ -9,7 +9,7 @@ import numpy as np
 from fastapi import APIRouter, Response
 from lineloom import wire
 from lineloom_core.io import csv, tum
-from lineloom_core.mapping.site_view import TrajectoryView
+from lineloom_core.mapping.answers.site_view import TrajectoryView
 
 from lineloom_service.answers import answer, format_choice, unknown_format
 from lineloom_service.convert import to_trajectory

@@ -10,7 +10,7 @@ import httpx
 import pytest
 from lineloom.cli import check_installation
 from lineloom_core.io.jsonl import ScanRecord, record_to_json, write_jsonl
-from lineloom_core.simulation import DriftingOdometry, Fleet
+from lineloom_lab.simulation import DriftingOdometry, Fleet
 
 from tests.clients.cli.test_commands import run
 from tests.clients.fake_service import FakeService, problem

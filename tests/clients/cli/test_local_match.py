@@ -11,7 +11,7 @@ import pytest
 from lineloom.cli.app import app
 from lineloom_core.geometry import Pose
 from lineloom_core.io.jsonl import ScanRecord, write_jsonl
-from lineloom_core.simulation import rooms, scanner_360
+from lineloom_lab.simulation import rooms, scanner_360
 from typer.testing import CliRunner
 
 from tests.clients.fake_service import scan

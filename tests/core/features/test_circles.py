@@ -10,7 +10,7 @@ from lineloom_core.features import _circle_kernels as fast
 from lineloom_core.features import extract_features
 from lineloom_core.features.circles import CIRCLE_COLUMNS, COLUMN, ROOM, fit_circle
 from lineloom_core.geometry import Pose
-from lineloom_core.simulation import (
+from lineloom_lab.simulation import (
     FreeSpace,
     Lidar,
     World,
@@ -20,7 +20,7 @@ from lineloom_core.simulation import (
     sick_lms200,
     world_named,
 )
-from lineloom_core.simulation.blueprint import Blueprint
+from lineloom_lab.simulation.blueprint import Blueprint
 from numpy.typing import NDArray
 
 from tests.core.features import circle_twins as slow

@@ -10,7 +10,7 @@ from lineloom_core.features import EDGE, INTERIOR, UNKNOWN, ExtractionConfig, ex
 from lineloom_core.features import _kernels as fast
 from lineloom_core.geometry import Pose
 from lineloom_core.scan import Scan
-from lineloom_core.simulation import FreeSpace, Lidar, scanner_360, sick_lms200, world_named
+from lineloom_lab.simulation import FreeSpace, Lidar, scanner_360, sick_lms200, world_named
 from numpy.typing import NDArray
 
 from tests.core.features import slow_twins as slow

@@ -25,7 +25,7 @@ from lineloom_core.features._kernels import (
 from lineloom_core.geometry import Pose
 from lineloom_core.geometry.angles import wrap_array
 from lineloom_core.scan import Scan
-from lineloom_core.simulation import (
+from lineloom_lab.simulation import (
     FreeSpace,
     Lidar,
     World,

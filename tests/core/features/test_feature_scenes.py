@@ -18,7 +18,7 @@ from lineloom_core.features import (
 from lineloom_core.features._kernels import LENGTH, THETA
 from lineloom_core.geometry import Pose
 from lineloom_core.scan import Scan
-from lineloom_core.simulation import Lidar, World, rectangle
+from lineloom_lab.simulation import Lidar, World, rectangle
 from numpy.typing import NDArray
 
 ONE_DEGREE = math.radians(1.0)

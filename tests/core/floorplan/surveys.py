@@ -13,7 +13,7 @@ from lineloom_core.features._kernels import VAR_OFFSET
 from lineloom_core.fusion import LineObservations, fuse
 from lineloom_core.fusion.occupancy import OccupancyGrid, Rays, rasterise
 from lineloom_core.geometry import Pose
-from lineloom_core.simulation import Fleet, World
+from lineloom_lab.simulation import Fleet, World
 from numpy.typing import NDArray
 
 APART_M = 0.6

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from lineloom_core.floorplan.alignment import aligning, dominant_direction
 from lineloom_core.geometry import Pose
-from lineloom_core.simulation import World, world_named
+from lineloom_lab.simulation import World, world_named
 from numpy.typing import NDArray
 
 QUARTER = 0.5 * math.pi

@@ -13,7 +13,7 @@ from lineloom_core.floorplan.registration import Registration, follow, judge_of,
 from lineloom_core.geometry import Pose, wrap
 from lineloom_core.io.floorplan_drawing import draw_differences
 from lineloom_core.io.svg import to_svg
-from lineloom_core.simulation import World, world_named
+from lineloom_lab.simulation import World, world_named
 from numpy.typing import NDArray
 
 from tests.core.floorplan.surveys import Survey, survey

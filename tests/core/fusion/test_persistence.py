@@ -15,7 +15,7 @@ from lineloom_core.fusion.persistence import (
     piece_balances,
 )
 from lineloom_core.geometry import Pose
-from lineloom_core.simulation import World, rectangle, scanner_360, sick_lms200
+from lineloom_lab.simulation import World, rectangle, scanner_360, sick_lms200
 from numpy.typing import NDArray
 
 ROOM = rectangle(8.0, 5.0)

@@ -15,10 +15,10 @@ from lineloom_core.features import extract_features
 from lineloom_core.geometry import Pose
 from lineloom_core.health import Finding, SensorDoctor, without_skew
 from lineloom_core.io.carmen import read_carmen
-from lineloom_core.mapping.tracker import Tracker
+from lineloom_core.mapping.facts.tracker import Tracker
 from lineloom_core.matching.local_map import Cloud
 from lineloom_core.scan import Mount, Scan
-from lineloom_core.simulation import (
+from lineloom_lab.simulation import (
     DriftingOdometry,
     Lidar,
     SimulatedRobot,
@@ -28,7 +28,7 @@ from lineloom_core.simulation import (
     round_hall,
     sick_lms200,
 )
-from lineloom_core.simulation.sensor_faults import (
+from lineloom_lab.simulation.sensor_faults import (
     Fault,
     faulty,
     frozen_from,

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 from lineloom_core.geometry import Pose
-from lineloom_core.mapping.site_view import (
+from lineloom_core.mapping.answers.site_view import (
     ComponentView,
     ConstraintView,
     KeyframeView,

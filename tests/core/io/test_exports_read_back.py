@@ -24,7 +24,7 @@ from lineloom_core.geometry import Pose
 from lineloom_core.io import csv, dxf, geojson, ieee1873, png, svg, tum
 from lineloom_core.io.reframe import in_frames, only
 from lineloom_core.io.selection import UnknownComponentError, clip
-from lineloom_core.mapping.site_view import MapLine, SiteView
+from lineloom_core.mapping.answers.site_view import MapLine, SiteView
 from numpy.typing import NDArray
 
 

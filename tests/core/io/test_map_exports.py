@@ -18,7 +18,7 @@ from lineloom_core.geometry import Pose
 from lineloom_core.io import csv, g2o, geojson, png, svg, tum
 from lineloom_core.io.drawing import robot_colour, tint
 from lineloom_core.io.selection import UnknownComponentError, clip, select
-from lineloom_core.mapping.site_view import SiteView
+from lineloom_core.mapping.answers.site_view import SiteView
 from PIL import Image
 
 SVG = "{http://www.w3.org/2000/svg}"

@@ -21,7 +21,7 @@ from lineloom_core.fusion.occupancy import (
 )
 from lineloom_core.io import nav2
 from lineloom_core.mapping.site_mapper import SiteMapper
-from lineloom_core.simulation import Fleet
+from lineloom_lab.simulation import Fleet
 from numpy.typing import NDArray
 from PIL import Image
 

@@ -7,16 +7,16 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from lineloom_core.evaluation import TrajectoryError, trajectory_error
 from lineloom_core.features import extract_features
 from lineloom_core.geometry import Pose
+from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_core.mapping.changes import Changes
+from lineloom_core.mapping.facts.tracker import Tracked, Tracker
 from lineloom_core.mapping.site_mapper import SiteMapper
-from lineloom_core.mapping.site_view import SiteView
-from lineloom_core.mapping.tracker import Tracked, Tracker
 from lineloom_core.matching.local_map import Cloud
 from lineloom_core.scan import Mount, Scan
-from lineloom_core.simulation import (
+from lineloom_lab.evaluation import TrajectoryError, trajectory_error
+from lineloom_lab.simulation import (
     Drive,
     Leg,
     Lidar,

@@ -8,12 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 from lineloom_core.features import ExtractionConfig
 from lineloom_core.geometry import Pose
-from lineloom_core.mapping.constraint import Constraint, step_information
-from lineloom_core.mapping.drift import step_drift
-from lineloom_core.mapping.keyframe import Keyframe, Step
-from lineloom_core.mapping.site_map import SiteMap
+from lineloom_core.mapping.belief.constraint import Constraint
+from lineloom_core.mapping.belief.site_map import SiteMap
+from lineloom_core.mapping.facts.drift import step_drift
+from lineloom_core.mapping.facts.information import step_information
+from lineloom_core.mapping.facts.keyframe import Keyframe, Step
 from lineloom_core.places import Place
-from lineloom_core.simulation import SimulatedScan
+from lineloom_lab.simulation import SimulatedScan
 from numpy.typing import NDArray
 
 

@@ -5,15 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from lineloom_core.mapping import rebuild as rebuilding
-from lineloom_core.mapping.advance import Advance, advance
-from lineloom_core.mapping.checkpoints import _stays
+from lineloom_core.mapping import site_mapper
+from lineloom_core.mapping.advance import contradicted_by_next
+from lineloom_core.mapping.answers.site_view import ConstraintView, SiteView
+from lineloom_core.mapping.belief.checkpoints import _stays
+from lineloom_core.mapping.belief.constraint import Constraint
+from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.config import MapperConfig, ThinningConfig
-from lineloom_core.mapping.keyframe import Keyframe
-from lineloom_core.mapping.site_map import SiteMap
+from lineloom_core.mapping.facts.keyframe import Keyframe
 from lineloom_core.mapping.site_mapper import SiteMapper
-from lineloom_core.mapping.site_view import ConstraintView, SiteView
-from lineloom_core.simulation import Fleet, SimulatedScan, rooms, sick_lms200
+from lineloom_lab.simulation import Fleet, SimulatedScan, rooms, sick_lms200
 
 from tests.core.mapping.drives import feed, fingerprint
 
@@ -43,11 +44,11 @@ def gone_through(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Keyframes that rebuilding goes through, as it does."""
     seen: list[int] = []
 
-    def counted(site: SiteMap, keyframe: Keyframe) -> Advance:
+    def counted(site: SiteMap, keyframe: Keyframe) -> tuple[Constraint, ...]:
         seen.append(keyframe.id)
-        return advance(site, keyframe)
+        return contradicted_by_next(site, keyframe)
 
-    monkeypatch.setattr(rebuilding, "advance", counted)
+    monkeypatch.setattr(site_mapper, "contradicted_by_next", counted)
     return seen
 
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import pytest
 from lineloom_core.geometry import Pose
-from lineloom_core.mapping.closing import close_nearby
+from lineloom_core.mapping.belief.constraint import Constraint
+from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.config import MapperConfig
-from lineloom_core.mapping.constraint import Constraint
-from lineloom_core.mapping.site_map import SiteMap
-from lineloom_core.simulation import SimulatedScan, rooms
+from lineloom_core.mapping.merging.near_loops import close_nearby
+from lineloom_lab.simulation import SimulatedScan, rooms
 
 from tests.core.mapping.drives import covered, legs, scans_of
 from tests.core.mapping.sites import lay_track, link, thinned

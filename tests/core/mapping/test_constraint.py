@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lineloom_core.geometry import Pose
-from lineloom_core.mapping.constraint import (
+from lineloom_core.mapping.belief.constraint import Constraint
+from lineloom_core.mapping.facts.information import (
     INDEPENDENT_SHARE,
-    Constraint,
     closure_information,
     step_information,
     turned,

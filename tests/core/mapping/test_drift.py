@@ -11,10 +11,10 @@ import pytest
 from lineloom_core.features import extract_features
 from lineloom_core.geometry import Pose
 from lineloom_core.graph import Edge, marginal_covariance, se2
-from lineloom_core.mapping.drift import Chain, NoiseFigure, reach, step_drift, way_drift
-from lineloom_core.mapping.tracker import Tracker
+from lineloom_core.mapping.facts.drift import Chain, NoiseFigure, reach, step_drift, way_drift
+from lineloom_core.mapping.facts.tracker import Tracker
 from lineloom_core.matching.local_map import Cloud, LocalMap
-from lineloom_core.simulation import (
+from lineloom_lab.simulation import (
     Lidar,
     SimulatedRobot,
     corridors,

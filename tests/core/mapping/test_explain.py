@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from lineloom_core.io.evidence_drawing import draw_evidence
 from lineloom_core.io.svg import to_svg
-from lineloom_core.mapping.answers import Evidence
+from lineloom_core.mapping.answers.evidence import Evidence
+from lineloom_core.mapping.answers.site_view import ConstraintView
 from lineloom_core.mapping.site_mapper import SiteMapper
-from lineloom_core.mapping.site_view import ConstraintView
-from lineloom_core.simulation import (
+from lineloom_lab.simulation import (
     Fleet,
     SimulatedRobot,
     SimulatedScan,

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from lineloom_core.features import ExtractionConfig
 from lineloom_core.geometry import Pose
-from lineloom_core.mapping import spool as spool_module
-from lineloom_core.mapping.chapter import Chapter
-from lineloom_core.mapping.history import History
-from lineloom_core.mapping.keyframe import Keyframe, Step
-from lineloom_core.mapping.memory import Memory
-from lineloom_core.mapping.spool import Spool, Spooled
+from lineloom_core.mapping.belief.memory import Memory
+from lineloom_core.mapping.facts import spool as spool_module
+from lineloom_core.mapping.facts.chapter import Chapter
+from lineloom_core.mapping.facts.history import History
+from lineloom_core.mapping.facts.keyframe import Keyframe, Step
+from lineloom_core.mapping.facts.spool import Spool, Spooled
 from lineloom_core.places import Recognition, RecognitionConfig
 from lineloom_core.scan import Scan
 
@@ -63,7 +63,7 @@ def written(keyframes: list[Keyframe]) -> History:
     for keyframe in keyframes:
         assert history.new_keyframe() == keyframe.id
         history.add(keyframe)
-        history.seal(memory)
+        history.seal(memory.hand_over)
     return history
 
 
@@ -174,7 +174,7 @@ def test_later_chapters_follow_the_earlier_ones() -> None:
     memory = Memory(RecognitionConfig())
     for f in KEYFRAMES[20:]:
         history.add(f)
-        history.seal(memory)
+        history.seal(memory.hand_over)
     assert history.chapters(0)[: len(first)] == first
     assert history.chapters(2) == history.chapters(0)[2:]
 

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from lineloom_core.geometry import Pose
 from lineloom_core.graph import chi_squared
-from lineloom_core.mapping import distinctive, joining
-from lineloom_core.mapping.changes import ComponentMerged
+from lineloom_core.mapping.belief.constraint import Constraint
+from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.config import JoinConfig, MapperConfig
-from lineloom_core.mapping.constraint import Constraint
-from lineloom_core.mapping.joining import join
-from lineloom_core.mapping.site_map import SiteMap
+from lineloom_core.mapping.merging import distinctive, joining
+from lineloom_core.mapping.merging.component_merged import ComponentMerged
+from lineloom_core.mapping.merging.joining import join
 from lineloom_core.places import Place
-from lineloom_core.simulation import SimulatedRobot, SimulatedScan, rooms, sick_lms200
+from lineloom_lab.simulation import SimulatedRobot, SimulatedScan, rooms, sick_lms200
 
 from tests.core.mapping.sites import lay_places, lay_track, link, thinned
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import pytest
+from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_core.mapping.site_mapper import SiteMapper
-from lineloom_core.mapping.site_view import SiteView
-from lineloom_core.simulation import (
+from lineloom_lab.simulation import (
     Lidar,
     SimulatedRobot,
     SimulatedScan,
@@ -16,7 +16,7 @@ from lineloom_core.simulation import (
     scanner_360,
     sick_lms200,
 )
-from lineloom_core.simulation.aliased_buildings import rooms_in_a_row
+from lineloom_lab.simulation.aliased_buildings import rooms_in_a_row
 
 from tests.core.mapping.drives import component_error
 

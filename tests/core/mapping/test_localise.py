@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from lineloom_core.geometry import Pose
-from lineloom_core.mapping.localisation import Localisation, PoseHypothesis
-from lineloom_core.mapping.localise_score import descriptors, probability
+from lineloom_core.mapping.answers.localisation import Localisation, PoseHypothesis
+from lineloom_core.mapping.answers.localise_score import descriptors, probability
 from lineloom_core.mapping.site_mapper import SiteMapper
 from lineloom_core.scan import Scan
-from lineloom_core.simulation import (
+from lineloom_lab.simulation import (
     SimulatedRobot,
     SimulatedScan,
     World,

@@ -6,8 +6,8 @@ from itertools import chain
 from operator import attrgetter
 
 import pytest
-from lineloom_core.mapping.site_view import SiteView
-from lineloom_core.simulation import (
+from lineloom_core.mapping.answers.site_view import SiteView
+from lineloom_lab.simulation import (
     Fleet,
     SimulatedRobot,
     SimulatedScan,

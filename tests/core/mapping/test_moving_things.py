@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from lineloom_core.fusion.persistence import PersistenceConfig
+from lineloom_core.mapping.answers.site_view import MapLine, SiteView
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.site_mapper import SiteMapper
-from lineloom_core.mapping.site_view import MapLine, SiteView
-from lineloom_core.simulation import Fleet, SimulatedScan, rooms, scanner_360
+from lineloom_lab.simulation import Fleet, SimulatedScan, rooms, scanner_360
 
 from tests.core.mapping.drives import feed, fingerprint
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from lineloom_core.features import extract_features
 from lineloom_core.geometry import Pose
-from lineloom_core.mapping.tracker import Tracked, Tracker
+from lineloom_core.mapping.facts.tracker import Tracked, Tracker
 from lineloom_core.matching.local_map import Cloud
-from lineloom_core.simulation import Lidar, World, sick_lms200
+from lineloom_lab.simulation import Lidar, World, sick_lms200
 
 WALLS = World(np.array([[-80.0, 1.1, 80.0, 1.1], [80.0, -1.1, -80.0, -1.1]]))
 SHORT_SIGHTED = Lidar(

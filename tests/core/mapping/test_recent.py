@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from lineloom_core.features import extract_features
 from lineloom_core.geometry import Pose
-from lineloom_core.mapping.recent import Recent
-from lineloom_core.mapping.tracker import Tracker, TrackerConfig
+from lineloom_core.mapping.config import TrackerConfig
+from lineloom_core.mapping.facts.recent import Recent
+from lineloom_core.mapping.facts.tracker import Tracker
 from lineloom_core.matching.local_map import Cloud
-from lineloom_core.simulation import (
+from lineloom_lab.simulation import (
     Drive,
     Leg,
     Lidar,

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from lineloom_core.geometry import Pose
+from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_core.mapping.site_mapper import SiteMapper
-from lineloom_core.mapping.site_view import SiteView
 from lineloom_core.scan import Mount
-from lineloom_core.simulation import (
+from lineloom_lab.simulation import (
     Lidar,
     SimulatedRobot,
     SimulatedScan,

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from lineloom_core.evaluation.merge_bench_buildings import building_classes
-from lineloom_core.evaluation.merge_bench_fleets import bench_fleet
-from lineloom_core.evaluation.merge_bench_judge import Judge
 from lineloom_core.geometry import Pose
+from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.config import DoubtConfig, JoinConfig, MapperConfig
-from lineloom_core.mapping.contradictions import contradicted_by
-from lineloom_core.mapping.site_map import SiteMap
+from lineloom_core.mapping.merging.contradictions import contradicted_by
 from lineloom_core.mapping.site_mapper import SiteMapper
-from lineloom_core.simulation import SimulatedRobot, rooms, sick_lms200
+from lineloom_lab.evaluation.merge_bench_buildings import building_classes
+from lineloom_lab.evaluation.merge_bench_fleets import bench_fleet
+from lineloom_lab.evaluation.merge_bench_judge import Judge
+from lineloom_lab.simulation import SimulatedRobot, rooms, sick_lms200
 
 from tests.core.mapping.drives import fingerprint
 from tests.core.mapping.sites import lay_places, lay_track, link, thinned

@@ -9,8 +9,8 @@ import pytest
 from lineloom_core.mapping.changes import Changes
 from lineloom_core.mapping.site_mapper import SiteMapper
 from lineloom_core.scan import Mount, Scan
-from lineloom_core.simulation import Fleet, rooms, sick_lms200
-from lineloom_core.simulation.sensor_faults import in_millimetres, with_increment
+from lineloom_lab.simulation import Fleet, rooms, sick_lms200
+from lineloom_lab.simulation.sensor_faults import in_millimetres, with_increment
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 from lineloom_core.geometry import Pose
+from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.config import MapperConfig
-from lineloom_core.mapping.site_map import SiteMap
-from lineloom_core.simulation import SimulatedScan, rectangle
+from lineloom_lab.simulation import SimulatedScan, rectangle
 
 from tests.core.mapping.drives import legs, scans_of
 from tests.core.mapping.sites import lay_track, link, thinned

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.site_mapper import SiteMapper
-from lineloom_core.mapping.site_view import SiteView
 from lineloom_core.mapping.snapshot import Snapshot, SnapshotError
 from lineloom_core.scan import Mount, Scan
-from lineloom_core.simulation import Fleet, SimulatedScan, rooms, sick_lms200
+from lineloom_lab.simulation import Fleet, SimulatedScan, rooms, sick_lms200
 
 from tests.core.mapping.drives import component_error, empty, feed, fingerprint, mapped
 

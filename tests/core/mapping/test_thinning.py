@@ -9,16 +9,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from lineloom_core.geometry import Pose
+from lineloom_core.mapping.answers.site_view import SiteView
+from lineloom_core.mapping.belief.resting import Resting
+from lineloom_core.mapping.belief.site_map import SiteMap
+from lineloom_core.mapping.belief.thinning import thin
+from lineloom_core.mapping.belief.track import Track
 from lineloom_core.mapping.config import MapperConfig, ThinningConfig
-from lineloom_core.mapping.keyframe import Step
-from lineloom_core.mapping.resting import Resting
-from lineloom_core.mapping.site_map import SiteMap
+from lineloom_core.mapping.facts.keyframe import Step
 from lineloom_core.mapping.site_mapper import SiteMapper
-from lineloom_core.mapping.site_view import SiteView
 from lineloom_core.mapping.snapshot import Snapshot
-from lineloom_core.mapping.thinning import thin
-from lineloom_core.mapping.track import Track
-from lineloom_core.simulation import SimulatedScan, World, sick_lms200
+from lineloom_lab.simulation import SimulatedScan, World, sick_lms200
 
 from tests.core.mapping.drives import component_error, feed, fingerprint, legs, scans_of
 from tests.core.mapping.sites import lay_places, lay_track, link, thinned

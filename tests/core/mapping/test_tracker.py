@@ -10,8 +10,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from lineloom_core.geometry import Pose
-from lineloom_core.mapping.tracker import Tracked, Tracker, TrackerConfig
-from lineloom_core.simulation import (
+from lineloom_core.mapping.config import TrackerConfig
+from lineloom_core.mapping.facts.tracker import Tracked, Tracker
+from lineloom_lab.simulation import (
     DriftingOdometry,
     Lidar,
     SimulatedRobot,

@@ -7,9 +7,9 @@ import pickle
 import numpy as np
 import pytest
 from lineloom_core.geometry import Pose
-from lineloom_core.mapping.placed_scans import BLOCK, PlacedScan, PlacedScans
-from lineloom_core.mapping.site_view import UnplacedScan
-from lineloom_core.mapping.trajectories import Trajectories, Way, Whereabouts
+from lineloom_core.mapping.answers.trajectories import Trajectories, Way, Whereabouts
+from lineloom_core.mapping.facts.placed_scans import BLOCK, PlacedScan, PlacedScans
+from lineloom_core.mapping.facts.unplaced_scan import UnplacedScan
 
 RNG = np.random.default_rng(4)
 POSES = [Pose.from_array(row) for row in RNG.normal(size=(50, 3))]

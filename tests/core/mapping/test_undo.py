@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 import pytest
+from lineloom_core.mapping.answers.site_view import ConstraintView, SiteView
 from lineloom_core.mapping.site_mapper import SiteMapper
-from lineloom_core.mapping.site_view import ConstraintView, SiteView
 from lineloom_core.mapping.snapshot import Snapshot
-from lineloom_core.simulation import Fleet, SimulatedScan, rooms, sick_lms200
+from lineloom_lab.simulation import Fleet, SimulatedScan, rooms, sick_lms200
 
 from tests.core.mapping.drives import component_error, feed, fingerprint, mapped
 

@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from lineloom_core.geometry import Pose
-from lineloom_core.mapping.tracker import Tracked, Tracker
-from lineloom_core.mapping.wheels import Wheels
-from lineloom_core.simulation import Lidar, SimulatedRobot, SimulatedScan, World, rooms, sick_lms200
+from lineloom_core.mapping.facts.tracker import Tracked, Tracker
+from lineloom_core.mapping.facts.wheels import Wheels
+from lineloom_lab.simulation import Lidar, SimulatedRobot, SimulatedScan, World, rooms, sick_lms200
 
 from tests.core.mapping.drives import legs, track, track_errors
 

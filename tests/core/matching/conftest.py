@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from lineloom_core.evaluation.simulated_pairs import simulated_pairs
 from lineloom_core.features import ScanFeatures, extract_features
 from lineloom_core.geometry import Pose
-from lineloom_core.simulation import Lidar, scanner_360, sick_lms200, world_named
+from lineloom_lab.evaluation.simulated_pairs import simulated_pairs
+from lineloom_lab.simulation import Lidar, scanner_360, sick_lms200, world_named
 
 from tests.core.matching import slow_twins as slow
 

@@ -8,7 +8,7 @@ from lineloom_core.features import ScanFeatures, extract_features
 from lineloom_core.features._circle_kernels import RADIUS, SENSE
 from lineloom_core.geometry import Pose, wrap
 from lineloom_core.matching import _circle_match_kernels as fast
-from lineloom_core.simulation import World, column_corridor, round_hall, scanner_360
+from lineloom_lab.simulation import World, column_corridor, round_hall, scanner_360
 from numpy.typing import NDArray
 
 from tests.core.matching import circle_match_twins as slow

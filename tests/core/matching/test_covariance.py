@@ -8,11 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lineloom_core.evaluation.simulated_pairs import (
-    SimulatedPair,
-    driven_pairs,
-    simulated_pairs,
-)
 from lineloom_core.features import ScanFeatures
 from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.matching import LineMatcher, MatchResult
@@ -20,7 +15,12 @@ from lineloom_core.matching import _covariance_kernels as fast
 from lineloom_core.matching._refinement_kernels import LAST_ANGLE_GATE, LAST_DISTANCE_GATE
 from lineloom_core.matching._sweep import Sweep
 from lineloom_core.matching.covariance import FOUND_SIGMA, SLIDE_SIGMA, Claim, pose_covariance
-from lineloom_core.simulation import Lidar, scanner_360, sick_lms200, world_named
+from lineloom_lab.evaluation.simulated_pairs import (
+    SimulatedPair,
+    driven_pairs,
+    simulated_pairs,
+)
+from lineloom_lab.simulation import Lidar, scanner_360, sick_lms200, world_named
 from numpy.typing import NDArray
 
 from tests.core.matching import covariance_twins as slow

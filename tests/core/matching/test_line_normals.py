@@ -7,7 +7,7 @@ import pytest
 from lineloom_core.features import ScanFeatures, extract_features
 from lineloom_core.features._kernels import FIRST, LAST, OFFSET, THETA
 from lineloom_core.matching import _registration_kernels as fast
-from lineloom_core.simulation import FreeSpace, Lidar, scanner_360, sick_lms200, world_named
+from lineloom_lab.simulation import FreeSpace, Lidar, scanner_360, sick_lms200, world_named
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]

@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lineloom_core.evaluation import pose_error
-from lineloom_core.evaluation.simulated_pairs import SimulatedPair, simulated_pairs
 from lineloom_core.features import ScanFeatures
 from lineloom_core.geometry import Pose
 from lineloom_core.matching import LineMatcher, MatchResult, match
 from lineloom_core.scan import Scan
-from lineloom_core.simulation import scanner_360, sick_lms200, world_named
+from lineloom_lab.evaluation import pose_error
+from lineloom_lab.evaluation.simulated_pairs import SimulatedPair, simulated_pairs
+from lineloom_lab.simulation import scanner_360, sick_lms200, world_named
 
 MATCHER = LineMatcher()
 LIDARS = {"half turn": (sick_lms200(), 30), "full turn": (scanner_360(), 12)}

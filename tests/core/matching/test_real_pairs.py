@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from lineloom_core.evaluation import Pair, load_pairs, run_matcher, score_pairs
 from lineloom_core.matching import LineMatcher
+from lineloom_lab.evaluation import Pair, load_pairs, run_matcher, score_pairs
 
 FOLDER = Path(__file__).parents[4] / "shared" / "data" / "pairs"
 FILES = ("fr079.npz", "mit-csail.npz")

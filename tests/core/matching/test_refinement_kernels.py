@@ -11,7 +11,7 @@ from lineloom_core.geometry import Pose
 from lineloom_core.matching import _free_space_kernels as free
 from lineloom_core.matching import _refinement_kernels as fast
 from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE, judge_sweeps, seen_by
-from lineloom_core.simulation import rectangle, scanner_360, sick_lms200
+from lineloom_lab.simulation import rectangle, scanner_360, sick_lms200
 from numpy.typing import NDArray
 
 from tests.core.matching import slow_twins as slow

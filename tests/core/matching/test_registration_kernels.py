@@ -10,7 +10,7 @@ from lineloom_core.features import extract_features
 from lineloom_core.geometry import Pose, wrap
 from lineloom_core.matching import _registration_kernels as fast
 from lineloom_core.matching.local_map import Cloud, LocalMap
-from lineloom_core.simulation import FreeSpace, World, scanner_360, sick_lms200, world_named
+from lineloom_lab.simulation import FreeSpace, World, scanner_360, sick_lms200, world_named
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]

@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lineloom_core.evaluation import pose_error
 from lineloom_core.features import ScanFeatures
 from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.matching import LineMatcher, MatchResult
-from lineloom_core.simulation import (
+from lineloom_lab.evaluation import pose_error
+from lineloom_lab.simulation import (
     Lidar,
     World,
     column_corridor,

@@ -7,11 +7,11 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from lineloom_core.evaluation import pose_error
 from lineloom_core.geometry import Pose
 from lineloom_core.matching import LineMatcher, MatchResult
 from lineloom_core.scan import Scan
-from lineloom_core.simulation import (
+from lineloom_lab.evaluation import pose_error
+from lineloom_lab.simulation import (
     FreeSpace,
     Lidar,
     World,

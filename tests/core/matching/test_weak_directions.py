@@ -9,7 +9,7 @@ import pytest
 from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.matching import LineMatcher, MatchResult
 from lineloom_core.matching._hypothesis import translation_information, turn_information
-from lineloom_core.simulation import Lidar, World, round_hall, scanner_360, sick_lms200
+from lineloom_lab.simulation import Lidar, World, round_hall, scanner_360, sick_lms200
 from numpy.typing import NDArray
 
 MATCHER = LineMatcher()

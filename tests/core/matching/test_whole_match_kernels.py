@@ -21,7 +21,7 @@ from lineloom_core.matching import (
 )
 from lineloom_core.matching._sweep import Search, Sweep
 from lineloom_core.matching.matcher import MatcherConfig
-from lineloom_core.simulation import World, rectangle, sick_lms200
+from lineloom_lab.simulation import World, rectangle, sick_lms200
 from numpy.typing import NDArray
 
 from tests.core.matching import slow_twins as slow

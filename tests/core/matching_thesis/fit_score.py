@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from lineloom_core.evaluation.calibration import fit_logistic
-from lineloom_core.evaluation.pose_error import pose_error
-from lineloom_core.evaluation.simulated_pairs import SimulatedPair, simulated_pairs
 from lineloom_core.matching.thesis import ThesisMatcher
-from lineloom_core.simulation import sick_lms200, world_named
+from lineloom_lab.evaluation.calibration import fit_logistic
+from lineloom_lab.evaluation.pose_error import pose_error
+from lineloom_lab.evaluation.simulated_pairs import SimulatedPair, simulated_pairs
+from lineloom_lab.simulation import sick_lms200, world_named
 
 
 def descriptors(matcher: ThesisMatcher, pair: SimulatedPair) -> tuple[list[float], bool] | None:

@@ -15,7 +15,7 @@ from lineloom_core.matching.thesis.consistency import (
 )
 from lineloom_core.matching.thesis.edges import ANGLE, JUMP, NONE, VIRTUAL, Edges
 from lineloom_core.matching.thesis.line_segments import LineSegments
-from lineloom_core.simulation import sick_lms200, world_named
+from lineloom_lab.simulation import sick_lms200, world_named
 
 WINDOWS = Windows()
 E, I = True, False  # noqa: E741 edge point, interior point

@@ -12,7 +12,7 @@ from lineloom_core.matching.thesis import PrimitiveConfig, Primitives, extract_p
 from lineloom_core.matching.thesis.edges import ANGLE, JUMP, NONE, VIRTUAL
 from lineloom_core.matching.thesis.primitives import primitives_of_features, transform_to_points
 from lineloom_core.scan import Scan
-from lineloom_core.simulation import Lidar, World, rectangle, scanner_360, sick_lms200
+from lineloom_lab.simulation import Lidar, World, rectangle, scanner_360, sick_lms200
 
 EXACT = Lidar(-math.pi / 2, math.radians(1.0), 181, range_sigma=0.0)
 # A room whose left wall is hidden beyond a screen that stands in front of it, as in Fig. 3.7.

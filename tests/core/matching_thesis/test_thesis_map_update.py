@@ -13,7 +13,7 @@ from lineloom_core.matching.thesis.config import Windows
 from lineloom_core.matching.thesis.line_map import LineMap, MapLine, merge_all
 from lineloom_core.matching.thesis.line_segments import LineSegments
 from lineloom_core.matching.thesis.map_update import lines_on, update_map
-from lineloom_core.simulation import World, scanner_360
+from lineloom_lab.simulation import World, scanner_360
 
 ROOM = LineSegments.of(
     [[0, 0, 6, 0], [6, 0, 6, 4], [6, 4, 0, 4]], [(False, True), (True, True), (True, False)]

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lineloom_core.evaluation import load_pairs, run_matcher, score_pairs
-from lineloom_core.evaluation.pose_error import pose_error
 from lineloom_core.geometry import Pose
 from lineloom_core.matching import match
 from lineloom_core.matching.result import MatchResult
 from lineloom_core.matching.thesis import PrimitiveConfig, ThesisConfig, ThesisMatcher
 from lineloom_core.matching.thesis.score import agreement_score
 from lineloom_core.scan import Scan
-from lineloom_core.simulation import (
+from lineloom_lab.evaluation import load_pairs, run_matcher, score_pairs
+from lineloom_lab.evaluation.pose_error import pose_error
+from lineloom_lab.simulation import (
     FreeSpace,
     Lidar,
     World,

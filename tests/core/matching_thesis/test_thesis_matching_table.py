@@ -15,7 +15,7 @@ from lineloom_core.matching.thesis.distinguishability import (
 from lineloom_core.matching.thesis.edges import NONE
 from lineloom_core.matching.thesis.matcher import Description
 from lineloom_core.matching.thesis.matching_table import MatchingTable, compute_scores
-from lineloom_core.simulation import sick_lms200, world_named
+from lineloom_lab.simulation import sick_lms200, world_named
 from numpy.typing import NDArray
 
 WINDOWS = Windows()

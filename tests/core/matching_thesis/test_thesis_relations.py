@@ -23,7 +23,7 @@ from lineloom_core.matching.thesis.parallel_relation import (
     ParallelRelations,
 )
 from lineloom_core.matching.thesis.relations import RelationSet, extract_relations
-from lineloom_core.simulation import sick_lms200, world_named
+from lineloom_lab.simulation import sick_lms200, world_named
 
 WINDOWS = Windows()
 E, I = True, False  # noqa: E741 edge point, interior point

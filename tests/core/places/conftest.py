@@ -10,7 +10,7 @@ from lineloom_core.features import extract_features
 from lineloom_core.geometry import Pose
 from lineloom_core.matching.local_map import Cloud
 from lineloom_core.places import Glimpse, Place, Seen
-from lineloom_core.simulation import (
+from lineloom_lab.simulation import (
     Drive,
     FreeSpace,
     Lidar,

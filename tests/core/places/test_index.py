@@ -10,7 +10,7 @@ import pytest
 from lineloom_core.places import Place, PlaceIndex
 from lineloom_core.places import _index_kernels as kernels
 from lineloom_core.places import index as place_index
-from lineloom_core.simulation import sick_lms200
+from lineloom_lab.simulation import sick_lms200
 from numpy.typing import NDArray
 
 from tests.core.places.conftest import Stretch, of_one_line, office_stretches

@@ -11,7 +11,7 @@ from lineloom_core.features import EDGE
 from lineloom_core.features._kernels import LENGTH, OFFSET, THETA, VAR_OFFSET, VAR_THETA
 from lineloom_core.geometry import Pose, wrap
 from lineloom_core.places import Glimpse, Place
-from lineloom_core.simulation import rectangle, scanner_360, sick_lms200
+from lineloom_lab.simulation import rectangle, scanner_360, sick_lms200
 from numpy.typing import NDArray
 
 from tests.core.places.conftest import PlaceMaker, Stretch

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lineloom_core.evaluation import pose_error
 from lineloom_core.geometry import Pose
 from lineloom_core.places import Place, Recognition, RecognitionConfig, recognise
-from lineloom_core.simulation import (
+from lineloom_lab.evaluation import pose_error
+from lineloom_lab.simulation import (
     FreeSpace,
     Lidar,
     Planner,

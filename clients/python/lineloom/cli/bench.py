@@ -15,10 +15,10 @@ from lineloom.cli.failure import CommandError, Exit
 from lineloom.cli.one_thread import use_one_thread
 
 if TYPE_CHECKING:
-    from lineloom_core.evaluation.pair_bench_contestants import Contestant
-    from lineloom_core.evaluation.pair_bench_sets import BenchSet
-    from lineloom_core.experiments.worst_answers import BadAnswer
     from lineloom_core.matching import MatchResult
+    from lineloom_lab.evaluation.pair_bench_contestants import Contestant
+    from lineloom_lab.evaluation.pair_bench_sets import BenchSet
+    from lineloom_lab.experiments.worst_answers import BadAnswer
 
 SHARED_PAIRS = Path(__file__).resolve().parents[5] / "shared" / "data" / "pairs"
 """Where the real pairs lie beside a checkout: `../shared/data/pairs` from the project's root."""
@@ -94,8 +94,8 @@ def pairs(
     """
     use_one_thread()
     try:
-        from lineloom_core.evaluation.pair_bench import run_pair_bench
-        from lineloom_core.evaluation.pair_bench_report import to_json, to_markdown
+        from lineloom_lab.evaluation.pair_bench import run_pair_bench
+        from lineloom_lab.evaluation.pair_bench_report import to_json, to_markdown
     except ImportError:
         raise CommandError(
             "benchmarks need the core: `pip install lineloom-client[server]`"
@@ -120,7 +120,7 @@ class _Album:
 
     def add(self, who: str, pairs: BenchSet, results: Sequence[MatchResult]) -> None:
         """Keep what `who` got wrong in one set."""
-        from lineloom_core.experiments.worst_answers import bad_answers
+        from lineloom_lab.experiments.worst_answers import bad_answers
 
         if self._folder is not None:
             name = f"{who}-{pairs.collection}".replace(" ", "-")
@@ -128,7 +128,7 @@ class _Album:
 
     def save(self) -> None:
         """Write one figure per matcher and collection, PNG and SVG, and say where."""
-        from lineloom_core.experiments.worst_answers import worst_answers
+        from lineloom_lab.experiments.worst_answers import worst_answers
 
         if self._folder is None:
             return
@@ -143,7 +143,7 @@ class _Album:
 
 
 def _contestants(names: str) -> tuple[Contestant, ...]:
-    from lineloom_core.evaluation.pair_bench_contestants import chosen
+    from lineloom_lab.evaluation.pair_bench_contestants import chosen
 
     try:
         return chosen([name.strip() for name in names.split(",") if name.strip()])
@@ -152,7 +152,7 @@ def _contestants(names: str) -> tuple[Contestant, ...]:
 
 
 def _sets(data: Path | None, simulated: int, limit: int | None) -> tuple[BenchSet, ...]:
-    from lineloom_core.evaluation.pair_bench_sets import real_sets, simulated_sets
+    from lineloom_lab.evaluation.pair_bench_sets import real_sets, simulated_sets
 
     folder = data or SHARED_PAIRS
     sets: tuple[BenchSet, ...] = ()

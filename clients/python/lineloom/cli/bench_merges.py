@@ -68,9 +68,9 @@ def merges(
     """
     use_one_thread()
     try:
-        from lineloom_core.evaluation.merge_bench import run_merge_bench
-        from lineloom_core.evaluation.merge_bench_cases import full_cases, quick_cases
-        from lineloom_core.evaluation.merge_bench_report import to_json, to_markdown
+        from lineloom_lab.evaluation.merge_bench import run_merge_bench
+        from lineloom_lab.evaluation.merge_bench_cases import full_cases, quick_cases
+        from lineloom_lab.evaluation.merge_bench_report import to_json, to_markdown
     except ImportError:
         raise CommandError(
             "benchmarks need the core: `pip install lineloom-client[server]`"

@@ -27,7 +27,7 @@ from lineloom.client import Client
 from lineloom.scan_like import to_wire
 
 if TYPE_CHECKING:
-    from lineloom_core.simulation import Fleet
+    from lineloom_lab.simulation import Fleet
 
 SITE = "demo"
 _FIRST_START_S = 900.0

@@ -13,7 +13,7 @@ from lineloom.cli.console import note, out, print_json
 from lineloom.cli.failure import CommandError, Exit
 
 if TYPE_CHECKING:
-    from lineloom_core.experiments import Experiment, Report, Settings
+    from lineloom_lab.experiments import Experiment, Report, Settings
 
 SHARED_DATA = Path(__file__).resolve().parents[5] / "shared" / "data"
 """Where real data lies beside a checkout: `../shared/data` from the project's root."""
@@ -101,7 +101,7 @@ def experiment(
 
 def _settings(seed: int, quick: bool, matcher: MatcherChoice, data: Path | None) -> Settings:
     try:
-        from lineloom_core.experiments import Settings
+        from lineloom_lab.experiments import Settings
     except ImportError:
         raise CommandError(
             "experiments need the core: `pip install lineloom-client[server]`"
@@ -111,14 +111,14 @@ def _settings(seed: int, quick: bool, matcher: MatcherChoice, data: Path | None)
 
 def _list() -> None:
     _settings(0, True, MatcherChoice.BOTH, None)  # says what to install where the core is absent
-    from lineloom_core.experiments import EXPERIMENTS
+    from lineloom_lab.experiments import EXPERIMENTS
 
     width = max(len(e.name) for e in EXPERIMENTS)
     out.print("\n".join(f"{e.name.ljust(width)}  {e.about}" for e in EXPERIMENTS), markup=False)
 
 
 def _chosen(name: str | None) -> tuple[Experiment, ...]:
-    from lineloom_core.experiments import EXPERIMENTS, UnknownExperimentError, experiment_named
+    from lineloom_lab.experiments import EXPERIMENTS, UnknownExperimentError, experiment_named
 
     if name is None:
         raise CommandError("which experiment? `lineloom experiment --list` says", Exit.USAGE)
@@ -132,7 +132,7 @@ def _chosen(name: str | None) -> tuple[Experiment, ...]:
 
 def _report(chosen: Experiment, settings: Settings, one_of_many: bool) -> Report | None:
     """Run one experiment; where its data is missing, all others still run."""
-    from lineloom_core.experiments import MissingDataError
+    from lineloom_lab.experiments import MissingDataError
 
     note(f"{chosen.name}: {chosen.about} …")
     try:

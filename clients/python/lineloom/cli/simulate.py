@@ -18,7 +18,7 @@ from lineloom.cli.schedule import Due
 from lineloom.scan_like import to_wire
 
 if TYPE_CHECKING:
-    from lineloom_core.simulation import Fleet, Lidar
+    from lineloom_lab.simulation import Fleet, Lidar
 
 
 class LidarName(StrEnum):
@@ -120,7 +120,7 @@ def build_fleet(
 ) -> Fleet:
     """Make the fleet, or end the command with what is wrong."""
     try:
-        from lineloom_core.simulation import (
+        from lineloom_lab.simulation import (
             DriftingOdometry,
             Fleet,
             World,
@@ -160,7 +160,7 @@ def due(fleet: Fleet, session: str) -> Iterator[Due]:
 
 
 def _lidar(name: LidarName) -> Lidar:
-    from lineloom_core.simulation import scanner_360, sick_lms200
+    from lineloom_lab.simulation import scanner_360, sick_lms200
 
     return sick_lms200() if name is LidarName.SICK else scanner_360()
 

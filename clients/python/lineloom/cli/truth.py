@@ -56,7 +56,7 @@ class Truth:
         a: str, b: str, rows_a: Sequence[tuple[Row, Row]], rows_b: Sequence[tuple[Row, Row]]
     ) -> PairError:
         import numpy as np
-        from lineloom_core.evaluation.trajectory import trajectory_error
+        from lineloom_lab.evaluation.trajectory import trajectory_error
 
         both = np.array([*rows_a, *rows_b])
         error = trajectory_error(both[:, 0], both[:, 1])

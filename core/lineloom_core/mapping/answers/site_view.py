@@ -1,0 +1,166 @@
+"""What a site knows at one version: the immutable answer behind every query."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lineloom_core.geometry import Pose
+from lineloom_core.mapping.belief.constraint_state import (
+    ConstraintKind,
+    ConstraintState,
+    StateChange,
+)
+from lineloom_core.mapping.facts.robot_state import RobotState
+from lineloom_core.mapping.facts.unplaced_scan import UnplacedScan
+
+
+@dataclass(frozen=True)
+class RobotView:
+    """A robot at its latest processed scan.
+
+    pose: of the base (the laser where no mount is set) in the component's map frame, None before
+    the first scan could be placed. covariance: 3x3, order x, y, theta, in the map frame.
+    """
+
+    robot: str
+    component: str | None
+    pose: Pose | None
+    covariance: NDArray[np.float64] | None
+    state: RobotState
+    scans_processed: int
+    keyframes: int
+    latest_stamp: float | None
+    latest_session: str | None
+    latest_seq: int | None
+    health: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ComponentView:
+    """A set of trajectory pieces whose relative poses are known."""
+
+    id: str
+    robots: tuple[str, ...]
+    keyframes: int
+
+
+@dataclass(frozen=True)
+class TrajectoryView:
+    """Every processed scan of a robot, in processing order; n rows of those that were placed.
+
+    poses: (n, 3) x, y, theta of the base in the map frame of `component[i]`. unplaced: the others.
+    """
+
+    session: tuple[str, ...]
+    seq: NDArray[np.int64]
+    stamp: NDArray[np.float64]
+    component: tuple[str, ...]
+    poses: NDArray[np.float64]
+    unplaced: tuple[UnplacedScan, ...] = ()
+
+    def rows(self) -> Iterator[tuple[str, int, float, str | None, list[float] | None]]:
+        """Session, seq, stamp, component and pose of every scan; the last two None if unplaced."""
+        waiting = iter(self.unplaced)
+        lost = next(waiting, None)
+        seq, stamp, poses = self.seq.tolist(), self.stamp.tolist(), self.poses.tolist()
+        for i in range(len(seq) + 1):
+            while lost is not None and lost.after <= i:
+                yield lost.session, lost.seq, lost.stamp, None, None
+                lost = next(waiting, None)
+            if i < len(seq):
+                yield self.session[i], seq[i], stamp[i], self.component[i], poses[i]
+
+
+@dataclass(frozen=True)
+class MapLine:
+    """A wall piece seen by one or more scans; the free side lies left of 1 -> 2.
+
+    sigma [m]: one standard deviation of the line's position across itself. support: scans
+    (keyframes) that saw it. first_seen / last_seen: stamps on the seeing robots' own clocks.
+    """
+
+    id: str
+    component: str
+    x1: float
+    y1: float
+    x2: float
+    y2: float
+    sigma: float
+    support: int
+    robots: tuple[str, ...]
+    first_seen: float
+    last_seen: float
+
+
+@dataclass(frozen=True)
+class KeyframeView:
+    """A node of the pose graph: pose of the laser in the component's map frame."""
+
+    id: int
+    robot: str
+    component: str
+    session: str
+    seq: int
+    stamp: float
+    pose: Pose
+
+
+@dataclass(frozen=True, slots=True)
+class SubmapView:
+    """The last metres of a robot's way at one time, as places are recognised by them.
+
+    anchor: the keyframe whose frame is the submap's. keyframes: all of them, in driving order.
+    """
+
+    id: int
+    robot: str
+    anchor: int
+    keyframes: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class ConstraintView:
+    """An edge of the pose graph and why it is what it is.
+
+    T_a_b: pose of keyframe b in the frame of keyframe a. information: 3x3 in the tangent space of
+    T_a_b at b (order x, y, theta, in the axes of b, as gtsam's BetweenFactorPose2 takes it).
+    checks: figure per check, e.g. {"conflict": 0.03, "overlap_m": 11.2}. residual: whitened norm
+    in the graph now (None where the constraint is not in the graph).
+    """
+
+    id: str
+    kind: ConstraintKind
+    state: ConstraintState
+    keyframe_a: int
+    keyframe_b: int
+    T_a_b: Pose
+    information: NDArray[np.float64]
+    reason: str
+    checks: dict[str, float] = field(default_factory=dict)
+    consistency_set: tuple[str, ...] = ()
+    residual: float | None = None
+    history: tuple[StateChange, ...] = ()
+
+
+@dataclass(frozen=True)
+class SiteView:
+    """Everything published at one version.
+
+    version: number of log entries processed; grows with every one, so it is the same again after
+    a replay. merged_into: component id -> id of the survivor, for components that were absorbed.
+    trajectories: by robot, of all robots (put together when asked for, see `trajectories`).
+    """
+
+    version: int
+    robots: dict[str, RobotView]
+    components: tuple[ComponentView, ...]
+    merged_into: dict[str, str]
+    trajectories: Mapping[str, TrajectoryView]
+    lines: tuple[MapLine, ...]
+    keyframes: tuple[KeyframeView, ...]
+    constraints: tuple[ConstraintView, ...]
+    submaps: tuple[SubmapView, ...] = ()

@@ -1,0 +1,172 @@
+"""Turning the site's memory into the immutable view that queries are answered from."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lineloom_core.graph import Covariances, in_map_axes, se2
+from lineloom_core.mapping.answers.map_lines import fused_lines
+from lineloom_core.mapping.answers.site_view import (
+    ComponentView,
+    ConstraintView,
+    KeyframeView,
+    RobotView,
+    SiteView,
+    SubmapView,
+)
+from lineloom_core.mapping.answers.trajectories import Trajectories, Way, Whereabouts
+from lineloom_core.mapping.belief.site_map import SiteMap
+from lineloom_core.mapping.facts.robot_record import RobotRecord
+
+
+def build_view(site: SiteMap, robots: dict[str, RobotRecord], version: int) -> SiteView:
+    """Compose the view of a version; changes nothing."""
+    component_of = {k: site.component_id(k) for k in site.keyframes}
+    covariances = _Covariances(site)
+    return SiteView(
+        version=version,
+        robots={n: _robot(site, r, component_of, covariances) for n, r in robots.items()},
+        components=_components(site, component_of),
+        merged_into=dict(site.merged_into),
+        trajectories=_trajectories(site, robots, component_of),
+        lines=fused_lines(site, component_of),
+        keyframes=_keyframes(site, component_of),
+        constraints=_constraints(site),
+        submaps=_submaps(site),
+    )
+
+
+def _components(site: SiteMap, component_of: dict[int, str]) -> tuple[ComponentView, ...]:
+    members: dict[str, list[int]] = {}
+    for keyframe, component in component_of.items():
+        members.setdefault(component, []).append(keyframe)
+    return tuple(
+        ComponentView(
+            id=component,
+            robots=tuple(sorted({site.keyframes[k].robot for k in keyframes})),
+            keyframes=len(keyframes),
+        )
+        for component, keyframes in members.items()
+    )
+
+
+def _robot(
+    site: SiteMap, record: RobotRecord, component_of: dict[int, str], covariances: _Covariances
+) -> RobotView:
+    pose = covariance = component = None
+    latest = record.latest
+    if latest is not None:
+        T_base_laser = record.mount.T_base_laser
+        pose = site.pose(latest.keyframe) @ latest.T_keyframe_laser @ T_base_laser.inverse()
+        holder, _ = site.resting.on(latest.keyframe)
+        component = component_of[holder]
+        covariance = covariances.of(holder)
+    return RobotView(
+        robot=record.name,
+        component=component,
+        pose=pose,
+        covariance=covariance,
+        state=record.state,
+        scans_processed=record.processed,
+        keyframes=sum(1 for k in site.keyframes.values() if k.robot == record.name),
+        latest_stamp=record.stamp,
+        latest_session=record.session,
+        latest_seq=record.seq,
+        health=record.health,
+    )
+
+
+class _Covariances:
+    """Covariances of keyframes' poses against their component's anchor, in the map's axes."""
+
+    def __init__(self, site: SiteMap) -> None:
+        self._site = site
+        self._factored: dict[int, Covariances] = {}
+
+    def of(self, keyframe: int) -> NDArray[np.float64]:
+        """Return a keyframe's, shape (3, 3); a component is factored once."""
+        root = self._site.component_root(keyframe)
+        if root not in self._factored:
+            self._factored[root] = Covariances(self._site.graph.piece(root), root)
+        return in_map_axes(self._factored[root].of(keyframe), self._site.pose(keyframe))
+
+
+def _trajectories(
+    site: SiteMap, robots: dict[str, RobotRecord], component_of: dict[int, str]
+) -> Trajectories:
+    blocks = {name: record.placed.blocks() for name, record in robots.items()}
+    return Trajectories(
+        ways={
+            name: Way(
+                len(blocks[name]), tuple(record.unplaced), record.mount.T_base_laser.inverse()
+            )
+            for name, record in robots.items()
+        },
+        blocks=tuple(block for own in blocks.values() for block in own),
+        keyframes=_whereabouts(site, component_of),
+    )
+
+
+def _whereabouts(site: SiteMap, component_of: dict[int, str]) -> Whereabouts:
+    """Poses of all keyframes ever, in a few steps for all of them at once."""
+    ids, kept = site.graph.estimates()
+    resting, holders, T_holder_resting = site.resting.rows()
+    count = 1 + max(ids.max(initial=-1), resting.max(initial=-1))
+    poses, component = np.full((count, 3), np.nan), np.full(count, -1, dtype=np.int32)
+    names = {name: number for number, name in enumerate(dict.fromkeys(component_of.values()))}
+    poses[ids] = kept
+    component[ids] = [names[component_of[k]] for k in ids.tolist()]
+    poses[resting] = se2.compose(poses[holders], T_holder_resting)
+    component[resting] = component[holders]
+    return Whereabouts(poses, component, tuple(names))
+
+
+def _keyframes(site: SiteMap, component_of: dict[int, str]) -> tuple[KeyframeView, ...]:
+    return tuple(
+        KeyframeView(
+            id=k.id,
+            robot=k.robot,
+            component=component_of[k.id],
+            session=k.scan.session,
+            seq=k.scan.seq,
+            stamp=k.scan.stamp,
+            pose=site.pose(k.id),
+        )
+        for k in site.keyframes.values()
+    )
+
+
+def _submaps(site: SiteMap) -> tuple[SubmapView, ...]:
+    return tuple(
+        SubmapView(
+            id=place.id,
+            robot=site.keyframes[place.anchor].robot,
+            anchor=place.anchor,
+            keyframes=place.keyframes,
+        )
+        for place in site.places.values()
+    )
+
+
+def _constraints(site: SiteMap) -> tuple[ConstraintView, ...]:
+    """All constraints; what is barred is not in the map, but must be there to be restored."""
+    residuals = site.graph.residuals()
+    known = {**site.constraints, **{c.id: c for c in site.verdicts.all_barred()}}
+    return tuple(
+        ConstraintView(
+            id=c.id,
+            kind=c.kind,
+            state=c.state,
+            keyframe_a=c.keyframe_a,
+            keyframe_b=c.keyframe_b,
+            T_a_b=c.T_a_b,
+            information=c.information,
+            reason=c.reason,
+            checks=dict(c.checks),
+            consistency_set=c.consistency_set,
+            residual=residuals.get(c.id),
+            history=c.history,
+        )
+        for c in known.values()
+    )

@@ -1,0 +1,18 @@
+"""What kinds of constraint there are, and what may become of one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+ConstraintKind = Literal["sequential", "loop", "rendezvous"]
+ConstraintState = Literal["candidate", "accepted", "rejected", "retracted"]
+
+
+@dataclass(frozen=True, slots=True)
+class StateChange:
+    """When a constraint came into a state (`version`: log entries processed) and why."""
+
+    version: int
+    state: ConstraintState
+    reason: str

@@ -1,0 +1,84 @@
+"""What is not to be believed, whatever the scans say: retracted by an operator, or withdrawn.
+
+A verdict stands above the evidence: a pair that was retracted is never proposed again, and what
+says the same as a retracted recognition is refused with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from lineloom_core.mapping.belief.constraint import Constraint
+
+
+@dataclass(frozen=True)
+class Verdicts:
+    """retracted: by an operator, withdrawn: by the mapper; both by constraint id, as they were.
+
+    approved: restored by an operator after they had been withdrawn, so never withdrawn again.
+    """
+
+    retracted: Mapping[str, Constraint] = field(default_factory=dict)
+    withdrawn: Mapping[str, Constraint] = field(default_factory=dict)
+    approved: frozenset[str] = frozenset()
+
+    def barred(self, constraint_id: str) -> Constraint | None:
+        """The retracted or withdrawn constraint of this id, if there is one."""
+        return self.retracted.get(constraint_id) or self.withdrawn.get(constraint_id)
+
+    def all_barred(self) -> tuple[Constraint, ...]:
+        """Everything that is not to be believed, oldest first."""
+        return (*self.retracted.values(), *self.withdrawn.values())
+
+    def retract(self, constraint: Constraint) -> Verdicts:
+        """Also this one is not to be believed, says an operator."""
+        return replace(
+            self,
+            retracted={**self.retracted, constraint.id: constraint},
+            withdrawn=_without(self.withdrawn, constraint.id),
+            approved=self.approved - {constraint.id},
+        )
+
+    def withdraw(self, constraints: tuple[Constraint, ...]) -> Verdicts:
+        """Later scans contradict these."""
+        return replace(self, withdrawn={**self.withdrawn, **{c.id: c for c in constraints}})
+
+    def restore(self, constraint_id: str) -> Verdicts:
+        """An operator takes the word back, or overrules the mapper's."""
+        overruled = {constraint_id} if constraint_id in self.withdrawn else set()
+        return replace(
+            self,
+            retracted=_without(self.retracted, constraint_id),
+            withdrawn=_without(self.withdrawn, constraint_id),
+            approved=self.approved | overruled,
+        )
+
+    def operators_only(self) -> Verdicts:
+        """The mapper's own verdicts left aside: they follow from the history anew."""
+        return replace(self, withdrawn={})
+
+    def moved(self, other: Verdicts) -> tuple[Constraint, ...]:
+        """Constraints on which the two differ."""
+        groups = ((self.retracted, other.retracted), (self.withdrawn, other.withdrawn))
+        return tuple(
+            {**mine, **theirs}[name]
+            for mine, theirs in groups
+            for name in sorted(mine.keys() ^ theirs.keys())
+        )
+
+    def without(self, keyframes: set[int]) -> Verdicts:
+        """The same where these keyframes are forgotten."""
+
+        def stays(c: Constraint) -> bool:
+            return c.keyframe_a not in keyframes and c.keyframe_b not in keyframes
+
+        return Verdicts(
+            {i: c for i, c in self.retracted.items() if stays(c)},
+            {i: c for i, c in self.withdrawn.items() if stays(c)},
+            self.approved,
+        )
+
+
+def _without(items: Mapping[str, Constraint], key: str) -> dict[str, Constraint]:
+    return {k: c for k, c in items.items() if k != key}

@@ -1,0 +1,1 @@
+"""What robots' scans show by themselves: keyframes and how each was tracked. No belief enters."""

@@ -1,0 +1,5 @@
+"""How a robot is doing."""
+
+from typing import Literal
+
+RobotState = Literal["starting", "tracking", "lost"]

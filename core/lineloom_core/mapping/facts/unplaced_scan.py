@@ -1,0 +1,15 @@
+"""A scan that has no pose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class UnplacedScan:
+    """A processed scan that fitted nowhere; after: number of placed ones processed before it."""
+
+    session: str
+    seq: int
+    stamp: float
+    after: int

@@ -1,0 +1,1 @@
+"""What is proposed to be believed: loops, recognised places, joins, and second thoughts."""

@@ -1,0 +1,39 @@
+"""How much a place stands out among those of its own component, where the truth is known.
+
+Two robots in two rooms that look alike produce matches as good as two robots in one room. What
+tells them apart is the rest of the building: if a place is found again, almost as well, where it
+certainly is not, then finding it in another robot's map proves little. This is the thesis's
+distinguishability (§5.1) for whole places, and why a symmetric hall or a corridor of equal bays
+is not joined on looks.
+"""
+
+from __future__ import annotations
+
+from lineloom_core.mapping.belief.constraint import Constraint
+from lineloom_core.mapping.belief.site_map import SiteMap
+from lineloom_core.mapping.facts.drift import reach
+from lineloom_core.places import Place, evidence_elsewhere
+
+
+def is_distinctive(site: SiteMap, candidate: Constraint) -> bool:
+    """Whether the match is clearly better than any mistaken one known of either place."""
+    need = candidate.evidence / site.config.join.distinctive
+    return not any(
+        _looks_like(site, site.places[number], other, need)
+        for number in (candidate.place_a, candidate.place_b)
+        for other in site.places.values()
+        if site.same_component(other.anchor, site.places[number].anchor)
+    )
+
+
+def _looks_like(site: SiteMap, place: Place, other: Place, need: float) -> bool:
+    """Whether there is more evidence than `need` for another relative pose than the known one."""
+    first, second = (other, place) if other.id < place.id else (place, other)
+    known = site.pose(first.anchor).between(site.pose(second.anchor))
+    table = site.memory.look_alikes(first, second)
+    for drift in (site.rough_drift, site.drift):  # the second takes long and is seldom asked
+        slack = reach(drift(first.anchor, second.anchor)) if first is not second else 0.0
+        evidence = evidence_elsewhere(table, known, site.config.recognition, slack=slack)
+        if evidence <= need:
+            return False
+    return True

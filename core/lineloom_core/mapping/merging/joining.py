@@ -1,0 +1,181 @@
+"""Joining two components: when a set of constraints convinces.
+
+Steps of `join`: 1. leave out what says the same as something barred; 2. find the largest set of
+candidates that agree pairwise (PCM); 3. demand its size, its evidence, and that no other set rivals
+it; 4. demand that the places it rests on are distinctive: nothing elsewhere in their own component,
+where the truth is known, looks as much like them; 5. hold both maps against each other wherever
+they would overlap; 6. accept, join, optimise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+
+from lineloom_core.geometry import Pose
+from lineloom_core.graph import consistent_sets, pairwise_consistent, rigid_join, settle, together
+from lineloom_core.mapping.belief.constraint import CONSTRAINT_FLOOR, Constraint, turned_round
+from lineloom_core.mapping.belief.refusals import refuse_barred
+from lineloom_core.mapping.belief.site_map import SiteMap
+from lineloom_core.mapping.merging.component_merged import ComponentMerged
+from lineloom_core.mapping.merging.distinctive import is_distinctive
+from lineloom_core.mapping.merging.overlap import Overlap, overlap_of_sets
+
+
+def join(site: SiteMap, root: int, keyframe: int) -> ComponentMerged | None:
+    """Join the component of `keyframe` with that of `root` if a set of candidates convinces."""
+    other_root = site.component_root(keyframe)
+    a_root, b_root = min(root, other_root), max(root, other_root)
+    candidates = refuse_barred(site, _candidates_between(site, a_root, b_root))
+    chosen, rival = _best_sets(site, candidates)
+    objection = _objection_to_set(site, chosen, rival)
+    if objection:
+        _wait(site, candidates, objection)
+        return None
+    T_A_B, together = _solved_together(site, a_root, b_root, chosen)
+    overlap = overlap_of_sets(site, chosen, together)
+    objection = overlap.objection(site.config.join)
+    if objection:
+        _wait(site, chosen, objection)
+        return None
+    merged = _accept(site, chosen, b_root, T_A_B, _figures(site, chosen, rival, overlap))
+    _drop_others(site, candidates, chosen)
+    site.optimise(a_root)
+    return merged
+
+
+def _accept(
+    site: SiteMap, chosen: list[Constraint], b_root: int, T_A_B: Pose, figures: dict[str, float]
+) -> ComponentMerged:
+    """Carry b's component into a's frame and put the set into the graph."""
+    survivor, absorbed = (
+        site.component_id(k) for k in (chosen[0].keyframe_a, chosen[0].keyframe_b)
+    )
+    site.move_component(b_root, T_A_B)
+    ids = tuple(c.id for c in chosen)
+    for constraint in chosen:
+        accepted = constraint.moved_to(
+            "accepted", f"{len(ids)} constraints agree", site.now, consistency_set=ids
+        )
+        site.add_constraint(replace(accepted, checks={**accepted.checks, **figures}))
+    site.merged_into[absorbed] = survivor
+    return ComponentMerged(survivor, absorbed, ids)
+
+
+def _figures(
+    site: SiteMap, chosen: list[Constraint], rival: list[Constraint], overlap: Overlap
+) -> dict[str, float]:
+    """What the set was held to, for every one of its constraints to show."""
+    return {
+        "set_size": float(len(chosen)),
+        "set_evidence": sum(c.evidence for c in chosen),
+        "rival_evidence": float(sum(c.evidence for c in rival)),
+        "set_distinctive": float(_distinctive(site, chosen)),
+        "set_missing": overlap.set_missing,
+        "set_doubt": overlap.set_doubt,
+        "map_missing": overlap.map_missing,
+    }
+
+
+def _wait(site: SiteMap, candidates: list[Constraint], objection: str) -> None:
+    """Join nothing yet, and let every candidate say what it waits for."""
+    for c in candidates:
+        site.add_constraint(site.constraints[c.id].moved_to("candidate", objection, site.now))
+
+
+def _candidates_between(site: SiteMap, a_root: int, b_root: int) -> list[Constraint]:
+    """Open candidates between two components, best first, each leading from a to b."""
+    found = []
+    for c in site.constraints.values():
+        if c.state != "candidate":
+            continue
+        ra, rb = site.component_root(c.keyframe_a), site.component_root(c.keyframe_b)
+        if (ra, rb) == (a_root, b_root):
+            found.append(c)
+        elif (ra, rb) == (b_root, a_root):
+            found.append(turned_round(c))
+    found.sort(key=lambda c: (-c.evidence, c.id))
+    return found[: site.config.join.most_candidates]
+
+
+def _best_sets(
+    site: SiteMap, candidates: list[Constraint]
+) -> tuple[list[Constraint], list[Constraint]]:
+    """The largest set of candidates that agree with each other, and the next one."""
+    if not candidates:
+        return [], []
+    n = len(candidates)
+    T_A_a = np.array([site.pose(c.keyframe_a).to_array() for c in candidates])
+    T_B_b = np.array([site.pose(c.keyframe_b).to_array() for c in candidates])
+    T_a_b = np.array([c.T_a_b.to_array() for c in candidates])
+    agree = pairwise_consistent(
+        T_A_a, T_B_b, T_a_b, np.broadcast_to(CONSTRAINT_FLOOR, (n, 3, 3)),
+        lambda i, j: site.drift(candidates[i].keyframe_a, candidates[j].keyframe_a),
+        lambda i, j: site.drift(candidates[i].keyframe_b, candidates[j].keyframe_b),
+    )  # fmt: skip
+    sets = [[candidates[i] for i in members] for members in consistent_sets(agree, least=1)]
+    sets.sort(key=lambda s: -sum(c.evidence for c in s))
+    return sets[0], sets[1] if len(sets) > 1 else []
+
+
+def _objection_to_set(site: SiteMap, chosen: list[Constraint], rival: list[Constraint]) -> str:
+    """Why a set does not convince; empty where it does."""
+    config = site.config.join
+    if len(chosen) < config.least_set:
+        return "too few constraints agree"
+    if len({c.place_a for c in chosen}) < 2 or len({c.place_b for c in chosen}) < 2:
+        return "all constraints rest on one place"
+    for keyframe in (chosen[0].keyframe_a, chosen[0].keyframe_b):
+        if site.places_in_component(keyframe) < config.least_places:
+            return "too little is known of one component"
+    evidence = sum(c.evidence for c in chosen)
+    if evidence < config.least_evidence:
+        return "too little evidence in all"
+    if evidence < config.lead * sum(c.evidence for c in rival):
+        return "another set of constraints says something else"
+    if _distinctive(site, chosen) < config.least_distinctive:
+        return "the places look like others of the same robots"
+    return ""
+
+
+def _distinctive(site: SiteMap, chosen: list[Constraint]) -> int:
+    """How many of a set stand out, counted up to what it takes.
+
+    Those with most evidence are asked first: each is held against all places of its own maps, a
+    thousand of which take seconds.
+    """
+    found = (
+        c for c in sorted(chosen, key=lambda c: (-c.evidence, c.id)) if is_distinctive(site, c)
+    )
+    return sum(1 for _ in islice(found, site.config.join.least_distinctive))
+
+
+def _solved_together(
+    site: SiteMap, a_root: int, b_root: int, chosen: list[Constraint]
+) -> tuple[Pose, Mapping[int, Pose]]:
+    """T_A_B, and all poses in a's frame as they would be if the set were believed.
+
+    Both maps have drifted: held against each other as rigid pieces, right ones would collide.
+    """
+    between = [c.edge() for c in chosen]
+    T_A_B = rigid_join(
+        {c.keyframe_a: site.pose(c.keyframe_a) for c in chosen},
+        {c.keyframe_b: site.pose(c.keyframe_b) for c in chosen},
+        between,
+    )
+    piece_a, piece_b = site.graph.piece(a_root), site.graph.piece(b_root).moved(T_A_B)
+    both = together(piece_a, piece_b).with_edges(between)
+    return T_A_B, both.table(settle(both, both.row(a_root)))
+
+
+def _drop_others(site: SiteMap, candidates: list[Constraint], chosen: list[Constraint]) -> None:
+    kept = {c.id for c in chosen}
+    for c in candidates:
+        if c.id not in kept:
+            stored = site.constraints[c.id]
+            site.add_constraint(
+                stored.moved_to("rejected", "contradicts the set that was accepted", site.now)
+            )

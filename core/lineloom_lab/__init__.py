@@ -1,0 +1,1 @@
+"""The laboratory: simulator, benchmarks, experiments and others' matchers. No product needs it."""
