@@ -1,11 +1,11 @@
-"""The map as a file: which formats there are, and what each is made of."""
+"""The map as a file: `wire.MAP_FORMATS` has the formats, `lineloom_core.io` a writer for each."""
 
 from __future__ import annotations
 
 import asyncio
-import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 
 from lineloom_core.fusion.occupancy import (
     DEFAULT_RESOLUTION_M,
@@ -14,11 +14,10 @@ from lineloom_core.fusion.occupancy import (
     rasterise,
 )
 from lineloom_core.geometry import Pose
-from lineloom_core.io import csv, dxf, geojson, ieee1873, nav2, png, svg
+from lineloom_core.io import nav2
 from lineloom_core.io.selection import BBox, check_bbox
 from lineloom_core.mapping.answers.site_view import SiteView
 
-from lineloom_service.answers import JSON
 from lineloom_service.asking import ask
 from lineloom_service.errors import INVALID_PARAMETER, ProblemError
 from lineloom_service.floorplans import RaySource, lines_of
@@ -27,42 +26,7 @@ from lineloom_service.maps.map_json import write_line, write_map
 from lineloom_service.service import Service
 from lineloom_service.store.records import SiteRecord
 
-
-@dataclass(frozen=True, slots=True)
-class MapFormat:
-    """media_type: of the answer. suffix: of a file's name."""
-
-    media_type: str
-    suffix: str
-
-
-FORMATS: Mapping[str, MapFormat] = {
-    "json": MapFormat(JSON, "json"),
-    "geojson": MapFormat("application/geo+json", "geojson"),
-    "svg": MapFormat("image/svg+xml", "svg"),
-    "png": MapFormat("image/png", "png"),
-    "dxf": MapFormat("image/vnd.dxf", "dxf"),
-    "csv": MapFormat("text/csv", "csv"),
-    "ieee1873": MapFormat("application/xml", "xml"),
-    "nav2": MapFormat("application/zip", "zip"),
-}
-"""What a map can be had as; `core/docs/formats.md` tells of each."""
-
-_Render = Callable[[str, SiteView, str | None, BBox | None], str | bytes]
-
-_RENDER: Mapping[str, _Render] = {
-    "json": lambda site, view, c, box: write_map(
-        site, view, LineHistory(write_line).at(view), c, box
-    ),
-    "geojson": lambda _, view, c, box: json.dumps(
-        geojson.map_features(view, c, box), separators=(",", ":")
-    ),
-    "svg": lambda _, view, c, box: svg.render_map(view, c, box),
-    "png": lambda _, view, c, box: png.render_map(view, c, box),
-    "dxf": lambda _, view, c, box: dxf.write_map(view, c, box),
-    "csv": lambda _, view, c, box: csv.write_map(view, c, box),
-    "ieee1873": lambda site, view, c, box: ieee1873.write_map(view, c, box, site),
-}
+_WRITERS = "lineloom_core.io"
 
 
 @dataclass(frozen=True)
@@ -93,8 +57,9 @@ async def render_map(
     if resolution is not None:
         raise ProblemError(INVALID_PARAMETER, "resolution: only a nav2 map has one")
     form = (format, component, box, shown.key)
+    write = _json if format == "json" else import_module(f"{_WRITERS}.{format}").write_map
     return await service.maps.other(
-        site, shown.view, form, lambda: _RENDER[format](site.name, shown.view, component, box)
+        site, shown.view, form, lambda: write(shown.view, component, box, site.name)
     )
 
 
@@ -120,6 +85,10 @@ def read_bbox(text: str | None) -> BBox | None:
         detail = "query parameter 'bbox': must be x_min,y_min,x_max,y_max with min < max"
         raise ProblemError(INVALID_PARAMETER, detail) from None
     return box
+
+
+def _json(view: SiteView, component: str | None, box: BBox | None, site: str) -> bytes:
+    return write_map(site, view, LineHistory(write_line).at(view), component, box)
 
 
 async def _nav2(

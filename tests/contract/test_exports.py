@@ -11,9 +11,9 @@ from typing import Any
 import httpx
 import pytest
 import pytest_asyncio
+from lineloom.wire import MAP_FORMATS
 from lineloom_service.app import create_app
 from lineloom_service.engine.local_engine import LocalEngine
-from lineloom_service.map_files import FORMATS
 from lineloom_service.service import Service
 
 from tests.contract.posting import expect_problem
@@ -42,12 +42,12 @@ async def export(client: httpx.AsyncClient, **wanted: Any) -> dict[str, Any]:
     return made
 
 
-@pytest.mark.parametrize("format", sorted(FORMATS))
+@pytest.mark.parametrize("format", sorted(MAP_FORMATS))
 async def test_every_format_comes_as_what_it_is(client: httpx.AsyncClient, format: str) -> None:
     params = {"format": format, "component": "c1"}
     response = await client.get(f"{SITE}/map", params=params)
     assert response.status_code == 200, response.text
-    assert response.headers["content-type"].split(";")[0] == FORMATS[format].media_type
+    assert response.headers["content-type"].split(";")[0] == MAP_FORMATS[format].media_type
     assert response.content
     again = await client.get(
         f"{SITE}/map", params=params, headers={"If-None-Match": response.headers["etag"]}

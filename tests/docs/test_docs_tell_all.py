@@ -143,7 +143,7 @@ def test_every_reason_to_wait(module: str, function: str) -> None:
 
 
 def test_every_reason_to_withdraw() -> None:
-    source = (CORE / "mapping" / "contradictions.py").read_text(encoding="utf-8")
+    source = (CORE / "mapping" / "merging" / "contradictions.py").read_text(encoding="utf-8")
     reasons = {
         node.value.rstrip(" ,")
         for node in ast.walk(ast.parse(source))

@@ -14,6 +14,7 @@ from typing import Any
 import uvicorn
 from fastapi import APIRouter, FastAPI, Request, Response
 from fastapi.responses import JSONResponse, StreamingResponse
+from lineloom.wire import MAP_FORMATS, MapFormatList
 from lineloom_service.routes import viewer
 from lineloom_service.security.headers import SecurityHeaders
 
@@ -88,6 +89,10 @@ class FakeServer:
         @router.get("/v1/sites")
         def sites() -> Any:
             return {"sites": [site.site()] if self.exists else []}
+
+        @router.get("/v1/map-formats")
+        def map_formats() -> Any:
+            return MapFormatList(formats=dict(MAP_FORMATS))
 
         @router.get(f"{_SITE}/map")
         def line_map(request: Request, since: int | None = None) -> Response:

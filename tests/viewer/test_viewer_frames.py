@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import pytest
+from lineloom.wire import MAP_FORMATS
 from playwright.sync_api import Page, expect
 
 from tests.viewer.conftest import Console
@@ -39,6 +40,8 @@ def test_the_map_is_shown_in_the_floor_plan_and_still_after_a_reload(
     # The room is six by four metres, the one without a place lies below it.
     assert placed["c1"]["y"] + 4.0 < T_PLAN_C0["y"]
     assert len(page.evaluate("() => lineloom.frames.marks.found.missing")) == 1
+    for kind in MAP_FORMATS.values():  # all that the service writes is offered
+        expect(page.get_by_role("button", name=kind.title, exact=True)).to_have_count(1)
     with page.expect_download() as download, page.expect_request("**/map?*") as asked:
         page.get_by_role("button", name="DXF").click()
     assert asked.value.url.endswith("/map?format=dxf&frame=plan")

@@ -6,9 +6,8 @@
         tv rv forward side turn  stamp host logger_stamp
 
 Both lines carry two poses, of the laser and of the robot. A scan's `odometry` is the robot's pose
-(FLASER: `odom_*`), since that is the frame the contract gives odometry in; `laser_offset` tells
-where the log puts the laser on it. In logs that were corrected afterwards (fr079) the pose is no
-odometry any more.
+(FLASER: `odom_*`), since that is the frame the contract gives odometry in. In logs that were
+corrected afterwards (fr079) the pose is no odometry any more.
 
 FLASER lines do not say how their beams lie. They come from SICK lidars with a half-turn field of
 view, one beam per half or full degree, and an even count lacks the last beam: 181 and 361 beams
@@ -27,6 +26,7 @@ from typing import IO
 import numpy as np
 
 from lineloom_core.geometry import Pose
+from lineloom_core.io.log_scan import LogError, LogScan
 from lineloom_core.scan import InvalidScanError, Scan
 
 SICK_RANGE_MAX = 81.9
@@ -44,16 +44,6 @@ _ROBOTLASER_HEAD = 7
 _ROBOTLASER_TAIL = 14
 
 
-class CarmenError(ValueError):
-    """A line that cannot be read; the message begins with file:line."""
-
-    def __init__(self, path: Path, line: int, reason: str) -> None:
-        super().__init__(f"{path}:{line}: {reason}")
-        self.path = path
-        self.line = line
-        self.reason = reason
-
-
 @dataclass(frozen=True, slots=True)
 class FlaserSweep:
     """How the beams of FLASER lines lie, for logs that are not from a half-turn SICK."""
@@ -63,31 +53,22 @@ class FlaserSweep:
     range_max: float = SICK_RANGE_MAX
 
 
-@dataclass(frozen=True, slots=True)
-class CarmenScan:
-    """A scan and the laser's pose on the robot as the line has it, T_base_laser."""
-
-    scan: Scan
-    laser_offset: Pose
-    line: int
-
-
 def read_carmen(
     path: str | Path, *, session: str = "0", flaser: FlaserSweep | None = None
 ) -> Iterator[Scan]:
     """Yield the scans of a CARMEN log in file order, `seq` counting from 0.
 
     Ranges of 0 become NaN (unknown), ranges at or above the maximum +inf (no return). Raises
-    CarmenError on a broken line, OSError where the file cannot be read.
+    LogError on a broken line, OSError where the file cannot be read.
     """
-    for record in read_carmen_records(path, session=session, flaser=flaser):
+    for record in read_log(path, session=session, flaser=flaser):
         yield record.scan
 
 
-def read_carmen_records(
+def read_log(
     path: str | Path, *, session: str = "0", flaser: FlaserSweep | None = None
-) -> Iterator[CarmenScan]:
-    """Yield the scans with their line number and the laser's pose on the robot."""
+) -> Iterator[LogScan]:
+    """Yield the scans with their line numbers."""
     source = Path(path)
     parsers: dict[str, Callable[[list[str]], _Parsed]] = {
         "FLASER": lambda words: _parse_flaser(words, flaser),
@@ -107,10 +88,10 @@ def read_carmen_records(
                 parsed = parsers[word](text.split()[1:])
                 scan = parsed.to_scan(seq, session)
             except InvalidScanError as error:
-                raise CarmenError(source, number, f"{word}: {error}") from None
+                raise LogError(source, number, f"{word}: {error}") from None
             except ValueError as error:
-                raise CarmenError(source, number, f"{word}: {_plain(error)}") from None
-            yield CarmenScan(scan, parsed.robot.between(parsed.laser), number)
+                raise LogError(source, number, f"{word}: {_plain(error)}") from None
+            yield LogScan(scan, number)
             seq += 1
 
 
@@ -129,7 +110,6 @@ class _Parsed:
     angle_min: float
     angle_increment: float
     range_max: float
-    laser: Pose
     robot: Pose
     stamp: float
 
@@ -166,7 +146,6 @@ def _parse_flaser(words: list[str], sweep: FlaserSweep | None) -> _Parsed:
         angle_min=sweep.angle_min,
         angle_increment=sweep.angle_increment,
         range_max=sweep.range_max,
-        laser=_pose(tail[0:3]),
         robot=_pose(tail[3:6]),
         stamp=float(tail[6]),
     )
@@ -188,7 +167,6 @@ def _parse_robotlaser(words: list[str]) -> _Parsed:
         angle_min=float(words[1]),
         angle_increment=float(words[3]),
         range_max=float(words[4]),
-        laser=_pose(tail[0:3]),
         robot=_pose(tail[3:6]),
         stamp=float(tail[11]),
     )

@@ -29,7 +29,9 @@ def write_trajectory(trajectory: TrajectoryView) -> str:
     return target.getvalue()
 
 
-def write_map(view: SiteView, component: str | None = None, bbox: BBox | None = None) -> str:
+def write_map(
+    view: SiteView, component: str | None = None, bbox: BBox | None = None, site: str = ""
+) -> str:
     """Return a header and one row per line of the map (m, s; full precision).
 
     `robots` are separated by spaces: their names hold none. Raises as `selection.select` does.

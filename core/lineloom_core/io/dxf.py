@@ -21,7 +21,9 @@ _VERSION = "R2010"
 _SAME = "{00000000-0000-0000-0000-000000000000}"
 
 
-def write_map(view: SiteView, component: str | None = None, bbox: BBox | None = None) -> str:
+def write_map(
+    view: SiteView, component: str | None = None, bbox: BBox | None = None, site: str = ""
+) -> str:
     """Return the map as DXF text.
 
     Per component the layers `<id>-walls` (LINE, free side left of start to end),

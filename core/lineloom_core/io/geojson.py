@@ -7,6 +7,7 @@ frame, with each geometry in `place` as well as, for plain readers, in `geometry
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 from lineloom_core.io.selection import BBox, ComponentContent, select
@@ -20,6 +21,13 @@ _CORE = "http://www.opengis.net/spec/json-fg-1/1.0/conf/core"
 _LOCAL_METRES = "urn:lineloom:crs:local-metres"
 """A name of our own: no authority has one for a frame that hangs on a robot's first scan."""
 _DECIMALS = 4  # a tenth of a millimetre
+
+
+def write_map(
+    view: SiteView, component: str | None = None, bbox: BBox | None = None, site: str = ""
+) -> str:
+    """Return `map_features` as text."""
+    return json.dumps(map_features(view, component, bbox), separators=(",", ":"))
 
 
 def map_features(

@@ -22,10 +22,11 @@ _OVERSAMPLED_PIXELS_MAX = 60e6
 _ANCHORS = {"start": "ls", "middle": "ms", "end": "rs"}
 
 
-def render_map(
+def write_map(
     view: SiteView,
     component: str | None = None,
     bbox: BBox | None = None,
+    site: str = "",
     width_px: int = DEFAULT_WIDTH_PX,
 ) -> bytes:
     """Return the map of one component, or of all side by side, as a PNG file `width_px` wide.

@@ -11,7 +11,9 @@ from lineloom_core.io.selection import BBox
 from lineloom_core.mapping.answers.site_view import SiteView
 
 
-def render_map(view: SiteView, component: str | None = None, bbox: BBox | None = None) -> str:
+def write_map(
+    view: SiteView, component: str | None = None, bbox: BBox | None = None, site: str = ""
+) -> str:
     """Return the map of one component, or of all side by side, as an SVG document.
 
     bbox: only this part, x_min, y_min, x_max, y_max [m] in the component's map frame. Raises

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lineloom_core.io.log_scan import LogError, LogScan
 from lineloom_core.scan import InvalidScanError, Scan
 
 BEAMS = 682
@@ -26,14 +27,10 @@ _STARTS = {13 + BEAMS: 13, 24 + BEAMS: 24, 25 + BEAMS: 24}
 """Numbers in a row, and in which column the ranges begin."""
 
 
-class TinySlamError(ValueError):
-    """A row that cannot be read; the message begins with file:line."""
-
-
-def read_tinyslam(path: str | Path, *, session: str = "0") -> Iterator[Scan]:
+def read_log(path: str | Path, *, session: str = "0") -> Iterator[LogScan]:
     """Yield the scans in file order, `seq` counting from 0.
 
-    A last row that the recording cut short is left out. Raises TinySlamError, OSError.
+    A last row that the recording cut short is left out. Raises LogError, OSError.
     """
     source = Path(path)
     with source.open(encoding="ascii", errors="replace") as file:
@@ -42,9 +39,9 @@ def read_tinyslam(path: str | Path, *, session: str = "0") -> Iterator[Scan]:
         if not words or (index == len(rows) - 1 and len(words) < min(_STARTS)):
             continue
         try:
-            yield _scan(words, index, session)
+            yield LogScan(_scan(words, index, session), index + 1)
         except (InvalidScanError, ValueError) as error:
-            raise TinySlamError(f"{source}:{index + 1}: {error}") from None
+            raise LogError(source, index + 1, str(error)) from None
 
 
 def _scan(words: list[str], seq: int, session: str) -> Scan:

@@ -10,6 +10,7 @@ from typing import Any, Literal, Protocol, TypeVar, cast, runtime_checkable
 from lineloom_core.geometry import Pose
 from lineloom_core.matching import LineMatcher, Matcher
 from lineloom_core.matching.result import MatchResult
+
 from lineloom_lab import baselines as b
 
 Kind = Literal["default", "thesis", "baseline", "peer"]

@@ -23,7 +23,7 @@ from lineloom_service.errors import (
     field_errors,
     invalid_body,
 )
-from lineloom_service.map_files import FORMATS, render_map
+from lineloom_service.map_files import render_map
 from lineloom_service.map_frames import in_frame
 from lineloom_service.openapi import also_as, body_of
 from lineloom_service.request_body import read_body
@@ -75,7 +75,7 @@ async def list_exports(site: KnownSite, request: Request, service: ServiceDep) -
     "/v1/sites/{site}/exports/{export}",
     name="get_export",
     response_class=Response,
-    responses=also_as(*sorted({form.media_type for form in FORMATS.values()})),
+    responses=also_as(*sorted({form.media_type for form in wire.MAP_FORMATS.values()})),
 )
 async def get_export(
     site: KnownSite, export: str, request: Request, service: ServiceDep
@@ -94,7 +94,7 @@ async def get_export(
     }
     if matches(request.headers.get("if-none-match"), etag):
         return Response(status_code=304, headers=headers)
-    media_type = FORMATS[json.loads(file.about)["format"]].media_type
+    media_type = wire.MAP_FORMATS[json.loads(file.about)["format"]].media_type
     return Response(file.data, headers=headers, media_type=media_type)
 
 
@@ -150,7 +150,7 @@ def _export(request: Request, site: SiteRecord, file: FileRecord) -> wire.Export
         version=about["version"],
         format=about["format"],
         component=component,
-        media_type=FORMATS[about["format"]].media_type,
+        media_type=wire.MAP_FORMATS[about["format"]].media_type,
         size=file.size,
         sha256=file.sha256,
         created=file.created,
@@ -165,7 +165,7 @@ def _export(request: Request, site: SiteRecord, file: FileRecord) -> wire.Export
 
 
 def _filename(site: SiteRecord, file: FileRecord) -> str:
-    return f"{site.name}-{file.name}.{FORMATS[json.loads(file.about)['format']].suffix}"
+    return f"{site.name}-{file.name}.{wire.MAP_FORMATS[json.loads(file.about)['format']].suffix}"
 
 
 def _unknown(site: SiteRecord, export: str) -> ProblemError:

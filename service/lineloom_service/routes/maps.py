@@ -14,13 +14,14 @@ from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_service.answers import (
     JSON,
     IfNoneMatch,
+    answer,
     format_choice,
     matches,
     unknown_format,
 )
 from lineloom_service.dependencies import CurrentView, KnownSite, ServiceDep
 from lineloom_service.errors import INVALID_PARAMETER, UNKNOWN_COMPONENT, ProblemError
-from lineloom_service.map_files import FORMATS, read_bbox, render_map
+from lineloom_service.map_files import read_bbox, render_map
 from lineloom_service.map_frames import AlignQuery, FrameQuery, in_frame, versioned
 from lineloom_service.maps.map_store import MapPart
 from lineloom_service.openapi import NOT_MODIFIED, also_as
@@ -32,7 +33,9 @@ router = APIRouter(tags=["map"])
     "/v1/sites/{site}/map",
     response_model=wire.MapAnswer,
     responses={
-        **also_as(*(format.media_type for name, format in FORMATS.items() if name != "json")),
+        **also_as(
+            *(format.media_type for name, format in wire.MAP_FORMATS.items() if name != "json")
+        ),
         **NOT_MODIFIED,
         307: {"description": "The component was merged; Location is the survivor's map."},
     },
@@ -42,7 +45,7 @@ async def get_map(
     site: KnownSite,
     view: CurrentView,
     service: ServiceDep,
-    format: Annotated[str, format_choice(FORMATS)] = "json",
+    format: Annotated[str, format_choice(wire.MAP_FORMATS)] = "json",
     component: Annotated[str | None, Query(description="Only this component.")] = None,
     bbox: Annotated[str | None, Query(description="x_min,y_min,x_max,y_max in metres.")] = None,
     align: AlignQuery = False,
@@ -56,14 +59,14 @@ async def get_map(
     ] = None,
     if_none_match: IfNoneMatch = None,
 ) -> Response:
-    """Return the map: `format` is json, geojson, svg, png, dxf, csv, ieee1873 or nav2.
+    """Return the map in one of the formats that `/v1/map-formats` lists.
 
     With `since` (json only) only what changed after that version: lines that are new or not what
     they were, and ids that are gone; `full` says that the version is not known (any more) and that
     the answer is the whole map.
     """
-    if format not in FORMATS:
-        raise unknown_format(format, FORMATS)
+    if format not in wire.MAP_FORMATS:
+        raise unknown_format(format, wire.MAP_FORMATS)
     plain = format == "json" and frame == "map" and not align
     if since is not None and not plain:
         detail = "query parameter 'since': goes with format=json in the map's own frame only"
@@ -79,7 +82,13 @@ async def get_map(
     else:
         shown = await in_frame(service, site, view, align=align, frame=frame, component=component)
         content = await render_map(service, site, shown, format, component, box, resolution)
-    return Response(content, headers=headers, media_type=FORMATS[format].media_type)
+    return Response(content, headers=headers, media_type=wire.MAP_FORMATS[format].media_type)
+
+
+@router.get("/v1/map-formats", response_model=wire.MapFormatList)
+async def get_map_formats() -> Response:
+    """Return the formats that a map can be had in, by name."""
+    return answer(wire.MapFormatList(formats=dict(wire.MAP_FORMATS)))
 
 
 def _elsewhere(request: Request, view: SiteView, component: str) -> Response:

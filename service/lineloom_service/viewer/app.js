@@ -41,6 +41,7 @@ export class App {
     /** @type {SiteFeed|null} */
     this._feed = null;
     this._connection = "connecting";
+    this._exportsOffered = false;
 
     this.view = new MapView(byId("map"));
     this.view.layers = { ...this.view.layers, ...this.preferences.get("layers", {}) };
@@ -164,6 +165,7 @@ export class App {
     this._connection = connection;
     this.badge.connection(connection, detail);
     if (connection === "unauthorised") this.tokenDialog.open(detail);
+    if (connection === "live" || connection === "polling") void this._offerExports();
     this._showBlank(detail);
   }
 
@@ -238,6 +240,17 @@ export class App {
     this.notices.say(`${id} is ${action === "retract" ? "retracted" : "restored"}; the map follows`);
     this.time.goLive();
     this._feed?.refresh();
+  }
+
+  /** Once: what the service writes does not change while it runs. */
+  async _offerExports() {
+    if (this._exportsOffered) return;
+    this._exportsOffered = true;
+    try {
+      this.panel.exports((await this.api.get("v1/map-formats")).formats);
+    } catch {
+      this._exportsOffered = false;
+    }
   }
 
   /** Save a file in the coordinates that the map is shown in. @param {string} path within the site @param {string} name of the file */

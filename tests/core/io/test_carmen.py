@@ -9,12 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lineloom_core.geometry import Pose
-from lineloom_core.io.carmen import (
-    CarmenError,
-    FlaserSweep,
-    read_carmen,
-    read_carmen_records,
-)
+from lineloom_core.io.carmen import FlaserSweep, read_carmen, read_log
+from lineloom_core.io.log_scan import LogError
 
 DATA = Path(__file__).parents[4] / "shared" / "data"
 
@@ -62,26 +58,23 @@ def test_zero_is_unknown_and_the_maximum_is_no_return(tmp_path: Path) -> None:
     assert np.isfinite(scan.ranges).sum() == 179
 
 
-def test_odometry_is_the_robots_pose_and_the_offset_is_the_lasers(tmp_path: Path) -> None:
+def test_odometry_is_the_robots_pose_and_not_the_lasers(tmp_path: Path) -> None:
     path = write(
         tmp_path, flaser([2.0] * 181, laser="2 3 1.57079632679", robot="2 2.5 1.57079632679")
     )
-    (record,) = read_carmen_records(path)
+    (record,) = read_log(path)
     assert record.scan.odometry == Pose(2.0, 2.5, 1.57079632679)
-    assert record.laser_offset.x == pytest.approx(0.5)
-    assert record.laser_offset.y == pytest.approx(0.0, abs=1e-9)
     assert record.line == 1
 
 
 def test_robotlaser_speaks_for_itself(tmp_path: Path) -> None:
-    (record,) = read_carmen_records(write(tmp_path, robotlaser([1.0, 60.0, 0.0], remissions=2)))
+    (record,) = read_log(write(tmp_path, robotlaser([1.0, 60.0, 0.0], remissions=2)))
     scan = record.scan
     assert (scan.angle_min, scan.angle_increment, scan.range_max) == (-1.5, 0.01, 50.0)
     assert scan.stamp == 77.25
     assert scan.ranges[1] == np.inf
     assert np.isnan(scan.ranges[2])
     assert scan.odometry == Pose(1.0, 0.0, 0.0)
-    assert record.laser_offset == Pose(0.5, 0.0, 0.0)
 
 
 def test_seq_counts_scans_and_other_messages_are_passed_over(tmp_path: Path) -> None:
@@ -99,7 +92,7 @@ def test_a_scan_logged_as_both_messages_is_read_once(tmp_path: Path) -> None:
 
 def test_an_unknown_beam_count_needs_to_be_told_its_sweep(tmp_path: Path) -> None:
     path = write(tmp_path, flaser([2.0] * 5))
-    with pytest.raises(CarmenError, match=r"made-up\.log:1: FLASER: 5 beams.*FlaserSweep"):
+    with pytest.raises(LogError, match=r"made-up\.log:1: FLASER: 5 beams.*FlaserSweep"):
         list(read_carmen(path))
     (scan,) = read_carmen(path, flaser=FlaserSweep(-0.2, 0.1, range_max=1.5))
     assert scan.angles == pytest.approx([-0.2, -0.1, 0.0, 0.1, 0.2])
@@ -121,7 +114,7 @@ def test_an_unknown_beam_count_needs_to_be_told_its_sweep(tmp_path: Path) -> Non
 )
 def test_a_broken_line_is_named_by_file_and_line(tmp_path: Path, broken: str, reason: str) -> None:
     path = write(tmp_path, "# first\n", broken)
-    with pytest.raises(CarmenError, match=reason) as caught:
+    with pytest.raises(LogError, match=reason) as caught:
         list(read_carmen(path))
     assert str(caught.value).startswith(f"{path}:2: ")
 
@@ -159,12 +152,10 @@ def test_real_logs_agree_with_their_references(log: str, reference: str, scans: 
         np.testing.assert_allclose([scan.stamp for scan in read], truth["t"], atol=1e-6)
 
 
-def test_real_robotlaser_log_has_the_laser_behind_the_centre() -> None:
-    records = list(read_carmen_records(real("fr079/fr079-graph.log")))
+def test_a_real_robotlaser_log_is_read_whole() -> None:
+    records = list(read_log(real("fr079/fr079-graph.log")))
     assert len(records) == 1464
     assert {len(record.scan) for record in records} == {360}
-    offsets = np.array([record.laser_offset.to_array() for record in records])
-    np.testing.assert_allclose(offsets, np.tile([-0.04, 0.0, 0.0], (1464, 1)), atol=1e-5)
 
 
 def test_compressed_logs_are_read_whatever_their_name(tmp_path: Path) -> None:

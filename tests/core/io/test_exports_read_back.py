@@ -84,7 +84,7 @@ def test_gdal_reads_the_geojson(site_view: SiteView, tmp_path: Path, driver: str
 
 
 def test_svgelements_reads_walls_where_they_are(site_view: SiteView) -> None:
-    page = svgelements.SVG.parse(io.StringIO(svg.render_map(site_view, "c1")))
+    page = svgelements.SVG.parse(io.StringIO(svg.write_map(site_view, "c1")))
     walls = [
         piece
         for element in page.elements()
@@ -106,7 +106,7 @@ def test_svgelements_reads_walls_where_they_are(site_view: SiteView) -> None:
 
 
 def test_pypng_reads_the_png(site_view: SiteView) -> None:
-    data = png.render_map(site_view, width_px=600)
+    data = png.write_map(site_view, width_px=600)
     width, height, rows, _ = pypng.Reader(bytes=data).asRGB8()
     pixels = np.vstack([np.asarray(row, dtype=np.uint8) for row in rows])
     assert (width, height) == (600, pixels.shape[0])

@@ -25,7 +25,7 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 
 def drawn(view: SiteView, **options: object) -> ET.Element:
-    return ET.fromstring(svg.render_map(view, **options).encode())  # type: ignore[arg-type]
+    return ET.fromstring(svg.write_map(view, **options).encode())  # type: ignore[arg-type]
 
 
 def texts(root: ET.Element) -> list[str]:
@@ -84,7 +84,7 @@ def test_one_component_or_a_window_of_it(site_view: SiteView) -> None:
     assert all(left <= x <= right and top <= y <= bottom for x, y in inside)
 
 
-@pytest.mark.parametrize("render", [svg.render_map, png.render_map, geojson.map_features])
+@pytest.mark.parametrize("render", [svg.write_map, png.write_map, geojson.map_features])
 def test_wrong_questions_get_clear_answers(site_view: SiteView, render: object) -> None:
     assert callable(render)
     with pytest.raises(KeyError, match="no component 'nope' here; there is: 'c1', 'c3'") as failure:
@@ -150,14 +150,14 @@ def test_an_empty_site_is_drawn_as_such(site_view: SiteView) -> None:
         site_view, components=(), lines=(), trajectories={}, robots={}, keyframes=(), constraints=()
     )
     assert "No map yet" in texts(drawn(empty))
-    assert Image.open(io.BytesIO(png.render_map(empty))).size[0] == 1600
+    assert Image.open(io.BytesIO(png.write_map(empty))).size[0] == 1600
     assert geojson.map_features(empty)["features"] == []
     assert g2o.write_graph(empty) == ""
 
 
 def test_png_is_the_same_page(site_view: SiteView) -> None:
-    data = png.render_map(site_view, width_px=900)
-    assert png.render_map(site_view, width_px=900) == data
+    data = png.write_map(site_view, width_px=900)
+    assert png.write_map(site_view, width_px=900) == data
     picture = Image.open(io.BytesIO(data)).convert("RGB")
     assert picture.width == 900
     colours = np.asarray(picture).reshape(-1, 3)
@@ -167,9 +167,9 @@ def test_png_is_the_same_page(site_view: SiteView) -> None:
     greys = np.unique(colours[:, 0]).size
     assert greys > 100  # smooth edges
     with pytest.raises(ValueError, match="8000"):
-        png.render_map(site_view, width_px=9000)
+        png.write_map(site_view, width_px=9000)
     with pytest.raises(ValueError, match="200"):
-        png.render_map(site_view, width_px=20)
+        png.write_map(site_view, width_px=20)
 
 
 def test_many_robots_have_colours_of_their_own() -> None:

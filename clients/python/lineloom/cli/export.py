@@ -15,7 +15,6 @@ from lineloom.cli.console import out, print_json
 from lineloom.cli.deliver import deliver, refuse_terminal
 from lineloom.cli.failure import CommandError
 from lineloom.cli.map import (
-    SUFFIXES,
     Align,
     BBox,
     Component,
@@ -28,9 +27,11 @@ from lineloom.cli.map import (
 )
 from lineloom.cli.patience import quick
 from lineloom.client import Client
-from lineloom.wire import Export
+from lineloom.wire import MAP_FORMATS, Export
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
+
+_NAV2 = Format("nav2")
 
 Id = Annotated[str, typer.Argument(metavar="ID", help="Which export, as the list has it.")]
 
@@ -50,7 +51,7 @@ def export() -> None:
 
 @app.command("create")
 def create(
-    format: FormatOption = Format.NAV2,
+    format: FormatOption = _NAV2,
     site: options.Site = options.DEFAULT_SITE,
     component: Component = None,
     bbox: BBox = None,
@@ -124,8 +125,8 @@ def get(
         known = {entry.id: entry for entry in client.exports(site).exports}
         if export_id not in known:
             raise CommandError(f"{site} has no export {export_id}: see `lineloom export list`")
-        suffix = SUFFIXES.get(Format(known[export_id].format))
-        refuse_terminal(output, binary=suffix is not None, example=f"map.{suffix}")
+        kind = MAP_FORMATS[known[export_id].format]
+        refuse_terminal(output, binary=kind.binary, example=f"map.{kind.suffix}")
         content = client.export_file(site, export_id)
     if hashlib.sha256(content).hexdigest() != known[export_id].sha256:
         raise CommandError(f"{export_id}: the bytes that came are not those of its hash; try again")

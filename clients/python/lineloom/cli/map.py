@@ -13,19 +13,7 @@ from lineloom.cli.deliver import deliver, refuse_terminal
 from lineloom.cli.failure import CommandError, Exit
 from lineloom.cli.patience import quick
 from lineloom.client import Client
-
-
-class Format(StrEnum):
-    """What the service writes."""
-
-    JSON = "json"
-    GEOJSON = "geojson"
-    SVG = "svg"
-    PNG = "png"
-    DXF = "dxf"
-    CSV = "csv"
-    IEEE1873 = "ieee1873"
-    NAV2 = "nav2"
+from lineloom.wire import MAP_FORMATS
 
 
 class Frame(StrEnum):
@@ -35,8 +23,10 @@ class Frame(StrEnum):
     PLAN = "plan"
 
 
-SUFFIXES = {Format.PNG: "png", Format.NAV2: "zip"}
-"""Endings of those that are no text."""
+Format = StrEnum("Format", list(MAP_FORMATS))  # type: ignore[misc]
+"""What the service writes."""
+
+_SVG = Format("svg")
 
 FormatOption = Annotated[Format, typer.Option("--format", "-f", help="What kind of file to make.")]
 Component = Annotated[
@@ -59,7 +49,7 @@ Resolution = Annotated[
 
 
 def map_(
-    format: FormatOption = Format.SVG,
+    format: FormatOption = _SVG,
     output: options.Output = None,
     site: options.Site = options.DEFAULT_SITE,
     component: Component = None,
@@ -80,13 +70,13 @@ def map_(
       lineloom map --site floor-2 --format svg --output map.svg
       lineloom map --format nav2 --component c0 --output map.zip
     """
-    chosen = Format.JSON if json else format
-    suffix = SUFFIXES.get(chosen)
-    refuse_terminal(output, binary=suffix is not None, example=f"map.{suffix}")
+    chosen = "json" if json else format.value
+    kind = MAP_FORMATS[chosen]
+    refuse_terminal(output, binary=kind.binary, example=f"map.{kind.suffix}")
     with Client(url, token=token, retry=quick()) as client:
         content = client.map_file(
             site,
-            chosen.value,
+            chosen,
             component=component,
             bbox=read_box(bbox),
             align=align,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from lineloom.cli.console import note
 from lineloom.cli.failure import CommandError, Exit
-from lineloom.cli.scan_files import read_scans
+from lineloom.cli.scan_files import LOG_FORMATS, read_scans
 from lineloom.cli.schedule import Stream, robot_name, split
 from lineloom.scan_like import to_wire
 from lineloom.wire import MountSettings, Scan
@@ -75,9 +75,8 @@ def _streams(path: Path, robot: str | None) -> list[Stream]:
         several = several or found.robot is not None
         scans.setdefault(found.robot or own, []).append(scan)
     if not scans:
-        raise CommandError(
-            f"{path} holds no scans: is it a CARMEN log, a tinySLAM log, JSON lines or a bag?"
-        )
+        names = [known.name for known in LOG_FORMATS.values()]
+        raise CommandError(f"{path} holds no scans: is it a log of {', '.join(names)} or a bag?")
     if robot is not None and several:
         # The log's own names would be lost: they become endings.
         return [Stream(f"{robot}-{name}", list(part)) for name, part in scans.items()]

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -13,8 +15,7 @@ from lineloom.cli.failure import CommandError, Exit
 from lineloom.errors import InvalidScanError
 from lineloom.scan_like import ScanLike, to_match_scan, to_wire
 
-_JSON_SUFFIXES = {".jsonl", ".ndjson", ".json"}
-_TINYSLAM_SUFFIXES = {".dat"}
+_JSON_SUFFIXES = frozenset({".jsonl", ".ndjson", ".json"})
 _ADDRESSED = re.compile(r"^(?P<path>.+):(?P<line>[0-9]+)$")
 
 
@@ -28,13 +29,20 @@ class FileScan:
     robot: str | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class LogFormat:
+    """name: for people. suffixes: of its files' names, in lower case. read: its scans, in order."""
+
+    name: str
+    suffixes: frozenset[str]
+    read: Callable[[Path], Iterator[FileScan]]
+
+
 def read_scans(path: Path) -> Iterator[FileScan]:
     """Yield the scans of a file; its name tells the format. Broken lines end the command."""
-    if path.suffix.lower() in _JSON_SUFFIXES:
-        return _json_lines(path, for_matching=False)
-    if path.suffix.lower() in _TINYSLAM_SUFFIXES:
-        return _tinyslam(path)
-    return _carmen(path)
+    *others, last = LOG_FORMATS.values()
+    fitting = (f for f in others if path.suffix.lower() in f.suffixes)
+    return next(fitting, last).read(path)
 
 
 def read_one(reference: str) -> FileScan:
@@ -95,29 +103,24 @@ def _refuse(constant: str) -> NoReturn:
     raise ValueError(f'{constant} is not JSON: write null, "inf" or "-inf"')
 
 
-def _carmen(path: Path) -> Iterator[FileScan]:
+def _log(module: str, name: str, path: Path) -> Iterator[FileScan]:
     try:
-        from lineloom_core.io.carmen import CarmenError, read_carmen_records
+        reader = importlib.import_module(f"lineloom_core.io.{module}")
+        log_error: type[Exception] = importlib.import_module("lineloom_core.io.log_scan").LogError
     except ImportError:
         raise CommandError(
-            f"{path}: reading CARMEN logs needs the core: `pip install lineloom-client[server]`"
+            f"{path}: reading {name} logs needs the core: `pip install lineloom-client[server]`"
         ) from None
     try:
-        for record in read_carmen_records(path):
-            yield FileScan(record.scan, record.line)
-    except CarmenError as error:
+        for found in reader.read_log(path):
+            yield FileScan(found.scan, found.line)
+    except log_error as error:
         raise CommandError(str(error)) from None
 
 
-def _tinyslam(path: Path) -> Iterator[FileScan]:
-    try:
-        from lineloom_core.io.tinyslam import TinySlamError, read_tinyslam
-    except ImportError:
-        raise CommandError(
-            f"{path}: reading tinySLAM logs needs the core: `pip install lineloom-client[server]`"
-        ) from None
-    try:
-        for scan in read_tinyslam(path):
-            yield FileScan(scan, scan.seq + 1)
-    except TinySlamError as error:
-        raise CommandError(str(error)) from None
+LOG_FORMATS: Mapping[str, LogFormat] = {
+    "jsonl": LogFormat("JSON lines", _JSON_SUFFIXES, partial(_json_lines, for_matching=False)),
+    "tinyslam": LogFormat("tinySLAM", frozenset({".dat"}), partial(_log, "tinyslam", "tinySLAM")),
+    "carmen": LogFormat("CARMEN", frozenset(), partial(_log, "carmen", "CARMEN")),
+}
+"""By the name of the module in `lineloom_core.io`; the last one reads what no other claims."""

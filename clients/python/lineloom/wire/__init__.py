@@ -32,7 +32,6 @@ from lineloom.wire.export import (
     ExportList,
     ExportRequest,
     MapDownload,
-    MapFormat,
     MapFrame,
 )
 from lineloom.wire.floorplan import FloorPlanAnswer, Placement, PlanDifferences, PlanPiece
@@ -45,6 +44,7 @@ from lineloom.wire.localize import (
     LocalizeRequest,
 )
 from lineloom.wire.map import Line, MapAnswer, MapChanges, MapComponent
+from lineloom.wire.map_format import MAP_FORMATS, MapFileKind, MapFormat, MapFormatList
 from lineloom.wire.match import Alternative, LinePair, MatchAnswer, MatchRequest, MatchScan
 from lineloom.wire.packing import JSON, MSGPACK, pack_json, pack_msgpack
 from lineloom.wire.pose import PoseAnswer, UncertainPose
@@ -59,6 +59,7 @@ from lineloom.wire.transform import Transform
 __all__ = [
     "ID_PATTERN",
     "JSON",
+    "MAP_FORMATS",
     "MAX_BATCH",
     "MAX_BEAMS",
     "MAX_BODY_BYTES",
@@ -98,7 +99,9 @@ __all__ = [
     "MapComponent",
     "MapDownload",
     "MapEvent",
+    "MapFileKind",
     "MapFormat",
+    "MapFormatList",
     "MapFrame",
     "MatchAnswer",
     "MatchRequest",

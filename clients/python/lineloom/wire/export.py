@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from lineloom.wire.base import Answer, Number, Request
+from lineloom.wire.map_format import MapFormat
 
-MapFormat = Literal["json", "geojson", "svg", "png", "dxf", "csv", "ieee1873", "nav2"]
 MapFrame = Literal["map", "plan"]
 
 

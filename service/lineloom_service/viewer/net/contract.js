@@ -3,6 +3,7 @@
  *
  * @typedef {import("../geometry/pose.js").Pose} Pose
  *
+ * @typedef {Record<string, {title: string, media_type: string, suffix: string}>} MapFormats
  * @typedef {{accepted: number, processed: number, pending: number, skipped: number}} ScanCounts
  * @typedef {{id: string, robots: string[], keyframes: number}} ComponentAnswer
  * @typedef {{site: string, version: number, idle: boolean, scans: ScanCounts, robots: string[],

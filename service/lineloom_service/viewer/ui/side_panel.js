@@ -7,17 +7,6 @@ import { icon } from "./icon.js";
 import { LayerSwitches } from "./layer_switches.js";
 import { LAYER_NAMES } from "../draw/layers.js";
 
-/** Formats of the map, and the names of their files. @type {[string, string, string][]} */
-const EXPORTS = [
-  ["SVG", "svg", "map.svg"],
-  ["PNG", "png", "map.png"],
-  ["GeoJSON", "geojson", "map.geojson"],
-  ["DXF", "dxf", "map.dxf"],
-  ["nav2", "nav2", "map.zip"],
-  ["CSV", "csv", "map.csv"],
-  ["IEEE 1873", "ieee1873", "map.xml"],
-];
-
 /**
  * The panel on the left (a sheet from below on phones) and the buttons of the bar.
  *
@@ -35,14 +24,19 @@ export class SidePanel {
     this._layers = new LayerSwitches(byId("layers"), LAYER_NAMES, onLayer);
     this.frames = new FrameChoice(byId("frames"), onFrame);
     this._help = new HelpDialog();
-    const buttons = EXPORTS.map(([words, format, name]) =>
-      h("button", { onclick: () => onDownload(`map?format=${format}`, name) }, words),
-    );
-    byId("exports").append(h("div", { className: "buttons" }, ...buttons));
+    this._onDownload = onDownload;
     this._prepareToggle();
     const help = byId("help-open");
     dress(help, "help", "Keys and help (?)");
     help.addEventListener("click", () => this.help());
+  }
+
+  /** Offer the map in every format that the service writes. @param {import("../net/contract.js").MapFormats} formats */
+  exports(formats) {
+    const buttons = Object.entries(formats).map(([format, { title, suffix }]) =>
+      h("button", { onclick: () => this._onDownload(`map?format=${format}`, `map.${suffix}`) }, title),
+    );
+    refill(byId("exports"), h("div", { className: "buttons" }, ...buttons));
   }
 
   help() {
