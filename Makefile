@@ -16,8 +16,9 @@ install: .venv/installed
 demo: install
 	$(BIN)/lineloom demo
 
+# A file's tests stay together, in one process of as many as there are cores.
 test: install
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses=auto --dist=loadfile --no-loadscope-reorder
 
 test-long: install
 	$(BIN)/python -m pytest -m long

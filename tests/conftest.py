@@ -1,0 +1,32 @@
+"""What holds for all tests: how long each file took is told, and the longest files begin first."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+SLOWEST_FIRST: tuple[str, ...] = ()
+"""Several processes share the files; what begins last should not take long."""
+
+_TOLD = 10
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the longest files first; all others stay in their order."""
+    order = {name: place for place, name in enumerate(SLOWEST_FIRST)}
+    root = Path(__file__).parent
+    items.sort(key=lambda item: order.get(str(item.path.relative_to(root)), len(order)))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Name the ten files that took longest."""
+    seconds: dict[str, float] = defaultdict(float)
+    for reports in terminalreporter.stats.values():
+        for report in reports:
+            if isinstance(report, pytest.TestReport):
+                seconds[report.location[0]] += report.duration
+    terminalreporter.section("the ten slowest files")
+    for name, took in sorted(seconds.items(), key=lambda row: -row[1])[:_TOLD]:
+        terminalreporter.write_line(f"{took:7.1f} s  {name}")
