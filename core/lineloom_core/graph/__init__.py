@@ -14,7 +14,6 @@ from lineloom_core.graph.covariance import (
     marginal_covariance,
 )
 from lineloom_core.graph.edge import Edge, EdgeKind, chi_squared
-from lineloom_core.graph.growing import GrowingArray
 from lineloom_core.graph.observability import Observability, observe, project_out_weak
 from lineloom_core.graph.piece import Piece, together
 from lineloom_core.graph.piece_join import rigid_join
@@ -26,7 +25,6 @@ __all__ = [
     "Covariances",
     "Edge",
     "EdgeKind",
-    "GrowingArray",
     "Observability",
     "Piece",
     "PoseGraph",

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from lineloom_core.graph import se2
+from lineloom_core.geometry import se2
 
 CHI2_99 = 11.345
 """99 % quantile of chi-squared with 3 degrees of freedom."""

@@ -12,8 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lineloom_core.geometry import Pose
-from lineloom_core.graph import se2
+from lineloom_core.geometry import Pose, se2
 from lineloom_core.graph.edge import Edge
 from lineloom_core.graph.normal_equations import NormalEquations
 from lineloom_core.graph.piece import Piece

@@ -9,8 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from lineloom_core.geometry import Pose
-from lineloom_core.graph import se2
+from lineloom_core.geometry import Pose, se2
 
 EdgeKind = Literal["sequential", "loop", "rendezvous"]
 

@@ -10,8 +10,7 @@ import scipy.sparse
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from lineloom_core.geometry import Pose
-from lineloom_core.graph import se2
+from lineloom_core.geometry import Pose, se2
 from lineloom_core.graph.edge import Edge
 from lineloom_core.graph.pose_table import PoseTable
 

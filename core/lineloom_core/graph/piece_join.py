@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lineloom_core.geometry import Pose
-from lineloom_core.graph import se2
+from lineloom_core.geometry import Pose, se2
 from lineloom_core.graph.edge import Edge
 
 _CHI2_CAP = 11.345  # 99 % of chi-squared with 3 degrees of freedom: beyond it all is equally wrong

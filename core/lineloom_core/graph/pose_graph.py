@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lineloom_core.geometry import Pose
-from lineloom_core.graph import se2
+from lineloom_core.geometry import Pose, se2
 from lineloom_core.graph.edge import Edge
-from lineloom_core.graph.growing import GrowingArray
 from lineloom_core.graph.piece import Piece, labels
 from lineloom_core.graph.pose_table import PoseTable
+from lineloom_core.growing import GrowingArray
 
 
 class PoseGraph:

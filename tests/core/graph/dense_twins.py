@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from lineloom_core.graph import Piece, se2
+from lineloom_core.geometry import se2
+from lineloom_core.graph import Piece
 from lineloom_core.graph.normal_equations import CAUCHY_K
 from numpy.typing import NDArray
 

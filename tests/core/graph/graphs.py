@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from lineloom_core.geometry import Pose
-from lineloom_core.graph import Edge, Piece, se2
+from lineloom_core.geometry import Pose, se2
+from lineloom_core.graph import Edge, Piece
 from lineloom_core.graph.edge import EdgeKind
 from numpy.typing import NDArray
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lineloom_core.geometry import Pose
-from lineloom_core.graph import Edge, Piece, se2, settle
+from lineloom_core.geometry import Pose, se2
+from lineloom_core.graph import Edge, Piece, settle
 from lineloom_core.graph.relax import relax
 from lineloom_core.graph.solver import levenberg_marquardt
 

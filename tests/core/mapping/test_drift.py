@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from lineloom_core.features import extract_features
-from lineloom_core.geometry import Pose
-from lineloom_core.graph import Edge, marginal_covariance, se2
+from lineloom_core.geometry import Pose, se2
+from lineloom_core.graph import Edge, marginal_covariance
 from lineloom_core.mapping.facts.drift import Chain, NoiseFigure, reach, step_drift, way_drift
 from lineloom_core.mapping.facts.tracker import Tracker
 from lineloom_core.matching.local_map import Cloud, LocalMap

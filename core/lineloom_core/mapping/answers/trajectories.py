@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lineloom_core.geometry import Pose
-from lineloom_core.graph import se2
+from lineloom_core.geometry import Pose, se2
 from lineloom_core.mapping.answers.site_view import TrajectoryView
 from lineloom_core.mapping.facts.placed_scans import ScanBlock
 from lineloom_core.mapping.facts.unplaced_scan import UnplacedScan

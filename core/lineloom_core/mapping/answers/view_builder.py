@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lineloom_core.graph import Covariances, in_map_axes, se2
+from lineloom_core.geometry import se2
+from lineloom_core.graph import Covariances, in_map_axes
 from lineloom_core.mapping.answers.map_lines import fused_lines
 from lineloom_core.mapping.answers.site_view import (
     ComponentView,

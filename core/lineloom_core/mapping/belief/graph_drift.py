@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lineloom_core.graph import Covariances, GrowingArray, Piece, PoseGraph
+from lineloom_core.graph import Covariances, Piece, PoseGraph
+from lineloom_core.growing import GrowingArray
 from lineloom_core.mapping.facts.keyframe import Keyframe, Step
 
 _ROOM = 64

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lineloom_core.geometry import Pose
-from lineloom_core.graph.growing import GrowingArray
+from lineloom_core.growing import GrowingArray
 
 MEASURED_SHORT = 2.0
 """Real tracks were off by up to 1.4 times what was measured: variances are doubled."""

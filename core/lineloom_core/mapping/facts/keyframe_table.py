@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lineloom_core.graph.growing import GrowingArray
+from lineloom_core.growing import GrowingArray
 from lineloom_core.mapping.facts.keyframe import Keyframe
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lineloom_core.geometry import Pose
-from lineloom_core.graph.growing import GrowingArray
+from lineloom_core.growing import GrowingArray
 
 BLOCK = 1024
 """Scans in a block; small enough for the last one to be written again with every view."""

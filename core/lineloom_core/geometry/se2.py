@@ -1,4 +1,4 @@
-"""SE(2) on whole arrays of poses: what the graph's inner loops need.
+"""SE(2) on whole arrays of poses: for inner loops, and without a solver.
 
 A pose is a row (x, y, theta) in m, m, rad. Tangent vectors are (dx, dy, dtheta) in the axes of
 the pose's source frame (right perturbation: T = T_hat Exp(xi)), as in gtsam. Every function
