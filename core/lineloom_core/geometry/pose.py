@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.geometry.angles import wrap
 
 
+@storable("pose")
 @dataclass(frozen=True, slots=True)
 class Pose:
     """A rigid motion T_target_source: p_target = R(theta) p_source + (x, y).
