@@ -178,7 +178,7 @@ def to_graph(site: str, view: SiteView) -> wire.Graph:
     ]
     submaps = [
         wire.Submap(id=s.id, robot=s.robot, anchor=s.anchor, keyframes=list(s.keyframes))
-        for s in view.submaps
+        for s in view.places
     ]
     summary = wire.GraphSummary(site=site, version=view.version, submaps=submaps)
     return wire.Graph(graph=summary, nodes=nodes, edges=edges)

@@ -63,7 +63,7 @@ def _recognition(made: list[Place], size: int) -> Row:
 
 
 def _solving(size: int) -> Row:
-    """A robot goes round the same loop again and again; the newest closure is off by 2 cm."""
+    """A robot goes round the same loop again and again; the newest loop is off by 2 cm."""
     graph, information = PoseGraph(), np.diag([1e4, 1e4, 1e5])
     rng, step = np.random.default_rng(size), Pose(0.4, 0.0, 2.0 * np.pi / 100)
     graph.add_node(0, Pose.identity())
@@ -80,7 +80,7 @@ def _solving(size: int) -> Row:
     piece = graph.piece(0)
     ours = median_seconds(lambda _: _solve(graph, piece), range(5))
     return solving_row(
-        f"graph, {size} keyframes solved after one more closure",
+        f"graph, {size} keyframes solved after one more loop",
         ours,
         median_seconds(lambda _: levenberg_marquardt(piece, 0), range(3)),
         "a loop at every fourth keyframe; not every keyframe asks for it",

@@ -113,7 +113,7 @@ class FakeMapper:
         self._link("retract", constraint)
         self._retracted[constraint] = self._version
 
-    def reinstate(self, constraint: str) -> None:
+    def restore(self, constraint: str) -> None:
         self._version += 1
         self._link("restore", constraint)
         self._retracted.pop(constraint, None)
@@ -188,7 +188,7 @@ class FakeMapper:
         return Snapshot(pickle.dumps(state), known, chapters)
 
     @classmethod
-    def restore(cls, snapshot: Snapshot) -> FakeMapper:
+    def resume(cls, snapshot: Snapshot) -> FakeMapper:
         mapper = cls()
         state = pickle.loads(snapshot.state)
         if (snapshot.first, snapshot.end) != (0, state.pop("chapters")):

@@ -17,7 +17,7 @@ from lineloom_service.engine import site_runner
 from lineloom_service.engine.current_entry import RESTORING
 from lineloom_service.engine.local_engine import LocalEngine
 from lineloom_service.engine.mapper import apply
-from lineloom_service.engine.protocol import RestoreFailedError, WorkerDiedError
+from lineloom_service.engine.protocol import ResumeFailedError, WorkerDiedError
 from lineloom_service.store import tables
 from lineloom_service.store.records import LogEntry, SnapshotRecord, StoreError
 from lineloom_service.store.sql_store import SqlStore
@@ -230,7 +230,7 @@ async def test_a_worker_that_dies_between_chapters_does_not_go_on_from_half_of_t
         reading.at = 2
         start = asyncio.create_task(engine.start_site(SITE, 80, snapshot.state, reading.read()))
         await reading.reached.wait()
-        with pytest.raises(WorkerDiedError, match="being restored"):
+        with pytest.raises(WorkerDiedError, match="being resumed"):
             await engine.ask(SITE, "rays", "c1")
         (killed,) = engine.pids
         os.kill(killed, signal.SIGKILL)
@@ -267,7 +267,7 @@ async def test_a_start_that_was_given_up_leaves_no_chapters_to_the_next() -> Non
         await reading.reached.wait()
         start.cancel()
         short = _Reading(snapshot.chapters[:4])
-        with pytest.raises(RestoreFailedError, match="not its chapters: 0 to 4"):
+        with pytest.raises(ResumeFailedError, match="not its chapters: 0 to 4"):
             await engine.start_site(SITE, 80, snapshot.state, short.read())
         await engine.start_site(SITE, 80, snapshot.state, _Reading(snapshot.chapters).read())
         assert await engine.snapshot(SITE) == snapshot

@@ -92,7 +92,7 @@ def test_ready_is_said_with_the_map_of_before(
     assert (after.version, after.scans.processed) == (before.version, scans)
     assert after.idle
     if saved < scans:
-        assert any(f"site s is being restored: entry {saved} of {scans}" in r for r in reasons)
+        assert any(f"site s is being resumed: entry {saved} of {scans}" in r for r in reasons)
 
 
 def _recorded(directory: Path) -> int:

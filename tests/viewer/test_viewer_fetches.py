@@ -42,7 +42,7 @@ def run(fake: FakeServer, page: Page) -> Callable[[str, Any], Any]:
 
 def _graph(view: SiteView) -> object:
     accepted = [(c.id, c.T_a_b) for c in view.constraints if c.state == "accepted"]
-    return view.keyframes, view.submaps, accepted
+    return view.keyframes, view.places, accepted
 
 
 def _constraints(view: SiteView) -> object:

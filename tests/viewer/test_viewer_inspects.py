@@ -211,7 +211,7 @@ def test_panning_zooming_fitting_and_a_reload(fake: FakeServer, page: Page) -> N
     assert camera(page)["scale"] == pytest.approx(fitted["scale"])
 
 
-@pytest.mark.parametrize("layer", ["Keyframes", "Submaps", "Rejected"])
+@pytest.mark.parametrize("layer", ["Keyframes", "Places", "Rejected"])
 def test_a_layer_is_drawn_when_it_is_switched_on(fake: FakeServer, page: Page, layer: str) -> None:
     open_viewer(page, fake.url, SITE)
     without = page.locator("#map").screenshot()

@@ -59,13 +59,13 @@ def test_the_fleet_merges_while_the_page_watches(
     assert page.evaluate("() => lineloom.history.latest.version") == len(drive)
     whole = page.evaluate(
         """() => {
-            const { submaps, keyframes } = lineloom.view.state;
-            return submaps.length > 2
-                && submaps.every(({ robot, keyframes: ids }) =>
+            const { places, keyframes } = lineloom.view.state;
+            return places.length > 2
+                && places.every(({ robot, keyframes: ids }) =>
                     ids.every((id) => keyframes.get(id).robot === robot));
         }"""
     )
-    assert whole, "submaps are of one robot's keyframes"
+    assert whole, "places are of one robot's keyframes"
     # The page kept what it received: the slider goes back to two components.
     slider = page.get_by_role("slider", name="Time")
     received = page.evaluate("() => lineloom.history._received.map((s) => s.components.length)")

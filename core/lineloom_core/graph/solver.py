@@ -1,6 +1,6 @@
 """Least squares on the pose graph. The only file that knows gtsam.
 
-Gauss-Newton on the exact normal equations comes first (`relax`): a keyframe's closure moves a
+Gauss-Newton on the exact normal equations comes first (`relax`): a keyframe's loop moves a
 graph that has settled before by little. Where it does not get there, gtsam's Levenberg-Marquardt
 takes over from the same start. Choices, and what they were measured against (600 to 1500 nodes in
 a building-like world, 12 to 200 loops, 0 to 30 % of them wrong by 0.5 or 4 m, four seeds each):

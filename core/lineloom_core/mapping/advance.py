@@ -9,67 +9,63 @@ and tied together where they run near each other; 5. what the new place contradi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from lineloom_core.mapping.belief.constraint import Constraint
 from lineloom_core.mapping.belief.place_making import place_is_due, recent_keyframes
 from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.belief.thinning import thin
 from lineloom_core.mapping.belief.track import Track
+from lineloom_core.mapping.changes import Changes
 from lineloom_core.mapping.facts.keyframe import Keyframe
 from lineloom_core.mapping.merging.candidates import consider
 from lineloom_core.mapping.merging.component_merged import ComponentMerged
 from lineloom_core.mapping.merging.contradictions import contradicted_by
-from lineloom_core.mapping.merging.near_loops import close_nearby
+from lineloom_core.mapping.merging.near_loops import close_near_loop
 from lineloom_core.places import Place
 
-_CLOSURES_UNSOLVED = 6
-_KEYFRAMES_A_CLOSURE = 500
-"""Small closures wait until there are a few; in a large map, which takes long to solve, until there
+_LOOPS_UNSOLVED = 6
+_KEYFRAMES_A_LOOP = 500
+"""Small loops wait until there are a few; in a large map, which takes long to solve, until there
 is one for so many keyframes."""
 
 
-@dataclass(frozen=True, slots=True)
-class Advance:
-    """merges: components joined. optimised: poses moved. contradicted: no longer to be believed."""
-
-    merges: tuple[ComponentMerged, ...] = ()
-    optimised: bool = False
-    contradicted: tuple[Constraint, ...] = ()
-
-
-def advance(site: SiteMap, keyframe: Keyframe) -> Advance:
-    """Take the next keyframe of the history."""
+def advance(site: SiteMap, keyframe: Keyframe) -> Changes:
+    """Take the next keyframe of the history; what is withdrawn is still believed in `site`."""
     site.append(keyframe)
-    optimised = _close_loops(site, keyframe.id)
+    moved = _near_loop_if_due(site, keyframe.id)
     place = _place_if_due(site, site.track(keyframe.id)) if keyframe.trusted else None
     if place is None:
-        return Advance(optimised=optimised)
-    merges, moved = consider(site, place)
+        return Changes(placed=True, keyframe=keyframe.id, optimised=moved)
+    merges, moved_too = consider(site, place)
     for merge in merges:
         _tie_after(site, merge)
     contradicted = contradicted_by(site, place)
     if not contradicted:
         thin(site, place)
-    return Advance(tuple(merges), optimised or moved, contradicted)
+    return Changes(
+        placed=True,
+        keyframe=keyframe.id,
+        merges=tuple(merges),
+        withdrawn=contradicted,
+        optimised=moved or moved_too or bool(contradicted),
+    )
 
 
 def contradicted_by_next(site: SiteMap, keyframe: Keyframe) -> tuple[Constraint, ...]:
     """Take the next keyframe of the history; what it shows to be wrong (for `rebuild`)."""
-    return advance(site, keyframe).contradicted
+    return advance(site, keyframe).withdrawn
 
 
-def _close_loops(site: SiteMap, keyframe: int) -> bool:
+def _near_loop_if_due(site: SiteMap, keyframe: int) -> bool:
     """Close a loop if there is one; solve the graph unless it says what was known."""
-    if len(site.track(keyframe).keyframes) % site.config.closure.every:
+    if len(site.track(keyframe).keyframes) % site.config.near_loops.every:
         return False
-    closed = close_nearby(site, keyframe)
+    closed = close_near_loop(site, keyframe)
     if closed is None:
         return False
     root = site.component_root(keyframe)
     waiting = site.unsolved.pop(root, 0) + 1
     step = closed.checks["moved_m"] + 2.0 * closed.checks["turned_rad"]
-    enough = max(_CLOSURES_UNSOLVED, len(site.keyframes) // _KEYFRAMES_A_CLOSURE)
+    enough = max(_LOOPS_UNSOLVED, len(site.keyframes) // _KEYFRAMES_A_LOOP)
     if step < 0.05 and waiting < enough:
         site.unsolved[root] = waiting
         return False  # it can wait for the next that says more
@@ -94,6 +90,7 @@ def _place_if_due(site: SiteMap, track: Track) -> Place | None:
 def _tie_after(site: SiteMap, merge: ComponentMerged) -> None:
     """After a merge, tie the two parts wherever they run near each other."""
     members = [k for k in sorted(site.keyframes) if site.component_id(k) == merge.survivor]
-    closed = [close_nearby(site, k) for k in members if k % 2 == 0]
+    every = site.config.near_loops.every
+    closed = [close_near_loop(site, k) for k in members if k % every == 0]
     if any(closed):
         site.optimise(members[0])

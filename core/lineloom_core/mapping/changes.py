@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from lineloom_core.mapping.belief.constraint import Constraint
 from lineloom_core.mapping.merging.component_merged import ComponentMerged
 
 
 @dataclass(frozen=True, slots=True)
 class Changes:
-    """The answer of `SiteMapper.add`.
+    """The answer of `SiteMapper.add`, and what `advance` says of a keyframe alone.
 
     placed: the scan has a pose. started_component: the scan opened a new component.
     keyframe: id of the keyframe made of it. merges: components joined now. withdrawn: constraints
@@ -21,5 +22,5 @@ class Changes:
     started_component: str | None = None
     keyframe: int | None = None
     merges: tuple[ComponentMerged, ...] = ()
-    withdrawn: tuple[str, ...] = ()
+    withdrawn: tuple[Constraint, ...] = ()
     optimised: bool = False

@@ -64,7 +64,7 @@ class PlaceConfig:
 
 
 @dataclass(frozen=True, slots=True)
-class ClosureConfig:
+class NearLoopConfig:
     """Closing loops where the graph already knows that two keyframes are near each other.
 
     radius [m], angle [rad]: how near. apart [m]: way driven in between, less is no loop. reach_xy,
@@ -162,7 +162,7 @@ class MapperConfig:
     tracker: TrackerConfig = field(default_factory=TrackerConfig)
     places: PlaceConfig = field(default_factory=PlaceConfig)
     recognition: RecognitionConfig = field(default_factory=RecognitionConfig)
-    closure: ClosureConfig = field(default_factory=ClosureConfig)
+    near_loops: NearLoopConfig = field(default_factory=NearLoopConfig)
     join: JoinConfig = field(default_factory=JoinConfig)
     doubt: DoubtConfig = field(default_factory=DoubtConfig)
     thinning: ThinningConfig = field(default_factory=ThinningConfig)

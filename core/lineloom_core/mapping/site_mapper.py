@@ -4,16 +4,17 @@ Steps of `SiteMapper.add`, for every scan of any robot:
  1. to 4. make a keyframe of it if it moved on (`front_end`): facts, which nothing later changes;
  5. to 7. close loops, recognise places, join components, optimise (`advance`): beliefs;
  8. where the scan contradicts what was believed, withdraw that and go through the history again
-    as if it had never been believed (`rebuild`). So do `retract`, `reinstate` and `forget`.
+    as if it had never been believed (`rebuild`). So do `retract`, `restore` and `forget`.
 
 No clock, no randomness, no I/O: the same log gives the same bits, also across `snapshot` and
-`restore`. Everything shown is a function of that state (`view`).
+`resume`. Everything shown is a function of that state (`view`).
 """
 
 from __future__ import annotations
 
 import pickle
 from collections.abc import Sequence
+from dataclasses import replace
 
 from lineloom_core.fusion.occupancy import Rays
 from lineloom_core.mapping.advance import advance, contradicted_by_next
@@ -92,19 +93,12 @@ class SiteMapper:
         return changes
 
     def _advance(self, keyframe: Keyframe, *, started: bool) -> Changes:
-        became = advance(self._site, keyframe)
-        if became.contradicted:
-            self._rebuild(self._site.verdicts.withdraw(became.contradicted))
+        changes = advance(self._site, keyframe)
+        if changes.withdrawn:
+            self._rebuild(self._site.verdicts.withdraw(changes.withdrawn))
         else:
             self._checkpoints.note(self._site, keyframe.id)
-        return Changes(
-            placed=True,
-            started_component=f"c{keyframe.track}" if started else None,
-            keyframe=keyframe.id,
-            merges=became.merges,
-            withdrawn=tuple(c.id for c in became.contradicted),
-            optimised=became.optimised or bool(became.contradicted),
-        )
+        return replace(changes, started_component=f"c{keyframe.track}") if started else changes
 
     def set_mount(self, robot: str, mount: Mount) -> None:
         """Set where a robot's lidar sits; `inverted` counts for the scans that follow."""
@@ -136,7 +130,7 @@ class SiteMapper:
         if known is not None and known.id not in self._site.verdicts.retracted:
             self._rebuild(self._retracting(known).operators_only())
 
-    def reinstate(self, constraint: str) -> None:
+    def restore(self, constraint: str) -> None:
         """Take a retraction back, or overrule a withdrawal; the map is as if it had not been."""
         self._version += 1
         if self._site.verdicts.barred(constraint) is not None:
@@ -177,14 +171,14 @@ class SiteMapper:
         return build_view(self._site, self._robots, self._version)
 
     def snapshot(self, known: int = 0) -> Snapshot:
-        """The whole state, for `restore`, without the first `known` chapters of the history."""
+        """The whole state, for `resume`, without the first `known` chapters of the history."""
         known_now = (self._site, self._robots, self._version)
         beliefs = dumps(known_now, self._memory, self._config)
         state = (SNAPSHOT_FORMAT, self._config, self._history, self._memory, beliefs)
         return Snapshot(pickle.dumps(state, protocol=5), known, self._history.chapters(known))
 
     @classmethod
-    def restore(cls, snapshot: Snapshot) -> SiteMapper:
+    def resume(cls, snapshot: Snapshot) -> SiteMapper:
         """Go on from a whole snapshot. Raises SnapshotError where it cannot be read."""
         try:
             form, config, history, memory, beliefs = pickle.loads(snapshot.state)
@@ -206,20 +200,18 @@ class SiteMapper:
     def _set_apart(self, robot: str, keyframe: Keyframe) -> Changes:
         """Go through the history again without places of a robot whose lidar is certainly wrong."""
         frames = self._site.keyframes
-        tied = {
-            c.id
-            for c in self._site.constraints.values()
+        tied = [
+            c
+            for _, c in sorted(self._site.constraints.items())
             if c.state == "accepted"
             and c.kind == "rendezvous"
             and robot in (frames[c.keyframe_a].robot, frames[c.keyframe_b].robot)
-        }
+        ]
         session = keyframe.scan.session
         self._rebuild(self._site.verdicts, self._history.of(robot, session)[0])
         kept = self._site.constraints
-        withdrawn = (i for i in sorted(tied) if i not in kept or kept[i].state != "accepted")
-        return Changes(
-            placed=True, keyframe=keyframe.id, withdrawn=tuple(withdrawn), optimised=True
-        )
+        gone = (c for c in tied if c.id not in kept or kept[c.id].state != "accepted")
+        return Changes(placed=True, keyframe=keyframe.id, withdrawn=tuple(gone), optimised=True)
 
     def _find(self, constraint: str) -> Constraint | None:
         return self._site.verdicts.barred(constraint) or self._site.constraints.get(constraint)

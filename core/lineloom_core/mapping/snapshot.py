@@ -14,7 +14,7 @@ class Snapshot:
     """State, and chapters of the history that it goes on from.
 
     Chapters are numbered from 0 and never change once they are there: who has kept the first
-    `first` of them from earlier snapshots of the same mapper need not take them again. To restore
+    `first` of them from earlier snapshots of the same mapper need not take them again. To resume
     it takes them all, so `first` must be 0.
     """
 

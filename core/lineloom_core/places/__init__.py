@@ -1,4 +1,4 @@
-"""Places: submaps that are recognised without any pose."""
+"""Places: the last metres of a robot's way, recognised without any pose."""
 
 from lineloom_core.places.index import PlaceIndex
 from lineloom_core.places.place import (

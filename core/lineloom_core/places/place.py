@@ -88,7 +88,7 @@ class Body:
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """A submap, all in the frame of its anchor keyframe: the glimpses of consecutive keyframes.
+    """Glimpses of consecutive keyframes as one piece of map, in the frame of its anchor keyframe.
 
     Its arrays are made when they are asked for, and kept for the places used last: a building has
     many more places than are compared at a time.

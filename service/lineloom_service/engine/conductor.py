@@ -144,7 +144,7 @@ class Conductor:
         if self._was_standby or not self._mapping:
             return unseen  # taking over, it goes on answering
         reasons = [
-            f"site {runner.name} is being restored"
+            f"site {runner.name} is being resumed"
             + (
                 f": entry {runner.done} of {runner.expected}"
                 if runner.done < runner.expected
@@ -245,7 +245,7 @@ class Conductor:
         elif (runner := self._runners.get(record.id)) is not None:
             runner.on_commit(record)
         elif self._mapping:
-            # New: nothing to restore, so it does not keep the service from being ready.
+            # New: nothing to resume, so it does not keep the service from being ready.
             self._runner(record, new=True)
 
     def _on_news(self, kind: NewsKind, key: str) -> None:

@@ -9,7 +9,7 @@ import tempfile
 import time
 
 RESTORING = -1
-"""Stands for a position while a snapshot is restored."""
+"""Stands for a position while a snapshot is read."""
 
 BUSY = -2
 """Stands for a position while the site is worked on, and no entry is to blame for it."""

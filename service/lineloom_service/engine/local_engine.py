@@ -36,7 +36,7 @@ from lineloom_service.engine.protocol import (
     FailureListener,
     MapperFailedError,
     QuestionFailedError,
-    RestoreFailedError,
+    ResumeFailedError,
     SnapshotFailedError,
     ViewListener,
     WorkerDiedError,
@@ -219,7 +219,7 @@ class LocalEngine:
         if hosted is None:
             raise WorkerDiedError(None, "the site is not hosted yet", killed=False)
         if hosted.gathering:
-            raise WorkerDiedError(None, "the site is being restored", killed=False)
+            raise WorkerDiedError(None, "the site is being resumed", killed=False)
         return self._ask(hosted, Ask(site, hosted.run, question, arguments))
 
     def stop_site(self, site: int) -> None:
@@ -289,7 +289,7 @@ class LocalEngine:
         elif isinstance(report, Failed):
             hosted.fail(MapperFailedError(report.position, report.reason))
         elif isinstance(report, Started) and report.failure is not None:
-            hosted.fail(RestoreFailedError(report.failure))
+            hosted.fail(ResumeFailedError(report.failure))
         elif hosted.awaited:
             _resolve(hosted.awaited.popleft(), report)
 

@@ -42,7 +42,7 @@ class Mapper(Protocol):
         """Believe a constraint no longer."""
         ...
 
-    def reinstate(self, constraint: str) -> None:
+    def restore(self, constraint: str) -> None:
         """Take a retraction back."""
         ...
 
@@ -62,7 +62,7 @@ class MapperFactory(Protocol):
         """Make a mapper that knows nothing."""
         ...
 
-    def restore(self, snapshot: Snapshot) -> Mapper:
+    def resume(self, snapshot: Snapshot) -> Mapper:
         """Make one from a whole snapshot."""
         ...
 
@@ -84,7 +84,7 @@ def apply(mapper: Mapper, entry: LogEntry) -> None:
         return
     if entry.kind in ("retract", "restore"):
         constraint = (entry.body or b"").decode()
-        act = mapper.retract if entry.kind == "retract" else mapper.reinstate
+        act = mapper.retract if entry.kind == "retract" else mapper.restore
         act(constraint)
         return
     if entry.body is None or entry.session is None or entry.seq is None:

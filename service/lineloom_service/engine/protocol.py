@@ -28,8 +28,8 @@ class MapperFailedError(Exception):
         self.reason = reason
 
 
-class RestoreFailedError(Exception):
-    """A snapshot cannot be restored. The site has to be started from another, or from nothing."""
+class ResumeFailedError(Exception):
+    """A snapshot cannot be read: the site has to be started from another, or from nothing."""
 
 
 class SnapshotFailedError(Exception):
@@ -95,7 +95,7 @@ class Engine(Protocol):
 
         state: as `snapshot` returned it. chapters: all that it goes on from, in order; one is read
         when the one before has arrived where the site is hosted, and what reading raises passes
-        through. Replaces the site's mapper where there is one. Raises RestoreFailedError.
+        through. Replaces the site's mapper where there is one. Raises ResumeFailedError.
         """
         ...
 

@@ -1,4 +1,4 @@
-"""One site's way from the log into the map: restore, feed, save, and what to do when it fails."""
+"""One site's way from the log into the map: resume, feed, save, and what to do when it fails."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from lineloom_service.engine.protocol import (
     Engine,
     MapperFailedError,
     Recorder,
-    RestoreFailedError,
+    ResumeFailedError,
     SnapshotFailedError,
     WorkerDiedError,
 )
@@ -73,7 +73,7 @@ class SiteRunner:
         new: bool = False,
     ) -> None:
         self.new = new
-        """Nothing of it was ever answered, so there is nothing to restore."""
+        """Nothing of it was ever answered, so there is nothing to resume."""
         self.site = record.id
         self.name = record.name
         self.skips: dict[int, Skip] = {}
@@ -142,7 +142,7 @@ class SiteRunner:
                 if death.position is not None:
                     how = "killed" if death.killed else "crashed"
                     await self._strike(death.position, how, death.reason)
-            except (RestoreFailedError, ChapterLostError) as failure:
+            except (ResumeFailedError, ChapterLostError) as failure:
                 await self._drop_snapshot(str(failure))
             except StoreError as error:
                 if "log" not in self._troubles:
@@ -191,7 +191,7 @@ class SiteRunner:
     async def _host(self) -> None:
         if self._recorder is not None:
             self._recorded = await self._recorder.recorded_position(self.site)
-        await self._restore()
+        await self._resume()
         self._troubles.pop("start", None)
         while True:
             self._wake.clear()
@@ -206,7 +206,7 @@ class SiteRunner:
                 await self._drain()
                 await self.save()
 
-    async def _restore(self) -> None:
+    async def _resume(self) -> None:
         """Start from the latest snapshot, or from nothing."""
         snapshot = await self._store.latest_snapshot(self.site, self._producer)
         self._saved = 0 if snapshot is None else snapshot.position

@@ -19,7 +19,7 @@ from lineloom_core.mapping.answers.trajectories import Trajectories
 
 T = TypeVar("T")
 
-_FIELDS = ("lines", "keyframes", "constraints", "submaps")
+_FIELDS = ("lines", "keyframes", "constraints", "places")
 """Those that grow with the map and are tuples of many objects."""
 
 _SCANS = "scans"

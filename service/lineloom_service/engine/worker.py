@@ -167,7 +167,7 @@ class Worker:
                 mapper = self._factory()
             else:
                 state = zlib.decompress(order.state)
-                mapper = self._factory.restore(Snapshot(state, 0, tuple(chapters)))
+                mapper = self._factory.resume(Snapshot(state, 0, tuple(chapters)))
         except Exception as error:
             self._connection.send(Started(order.site, order.run, describe(error)))
             return

@@ -70,7 +70,7 @@ def test_undo_and_redo_from_a_checkpoint_are_those_from_the_beginning(
     assert plain(often) == plain(never)
     chosen = accepted(often.view())[-age]
     begun = []
-    for act in (SiteMapper.retract, SiteMapper.reinstate):
+    for act in (SiteMapper.retract, SiteMapper.restore):
         for mapper in (often, never):
             gone_through.clear()
             act(mapper, chosen.id)

@@ -12,7 +12,7 @@ from lineloom_core.geometry import Pose
 from lineloom_core.mapping.belief.constraint import Constraint
 from lineloom_core.mapping.facts.information import (
     INDEPENDENT_SHARE,
-    closure_information,
+    observed_information,
     step_information,
     turned,
 )
@@ -98,15 +98,15 @@ def test_more_seen_is_never_less_sure(seed: int, factor: float) -> None:
     I = information(seed)  # noqa: E741
     for made, more in (
         (step_information(I, (0.15, 0.05)), step_information(factor * I, (0.15, 0.05))),
-        (closure_information(I), closure_information(factor * I)),
+        (observed_information(I), observed_information(factor * I)),
     ):
         assert np.linalg.eigvalsh(more - made).min() > -1e-6 * np.abs(more).max()
 
 
 @settings(max_examples=60, deadline=None)
 @given(angles)
-def test_a_closure_in_a_corridor_says_nothing_about_the_way_along(direction: float) -> None:
-    made = closure_information(corridor(direction))
+def test_a_loop_in_a_corridor_says_nothing_about_the_way_along(direction: float) -> None:
+    made = observed_information(corridor(direction))
     assert is_information(made)
     along = np.array([math.cos(direction), math.sin(direction), 0.0])
     across = np.array([-along[1], along[0], 0.0])
@@ -117,16 +117,16 @@ def test_a_closure_in_a_corridor_says_nothing_about_the_way_along(direction: flo
 
 @settings(max_examples=60, deadline=None)
 @given(seeds)
-def test_where_all_is_seen_a_closure_is_the_sum_of_both_covariances(seed: int) -> None:
+def test_where_all_is_seen_a_loop_is_the_sum_of_both_covariances(seed: int) -> None:
     # Strong enough that no direction is weak: then (S^-1 + F)^-1, which the formula avoids.
     I = information(seed, 1e6) + 1e6 * np.eye(3)  # noqa: E741
     floor = np.diag([0.006**2, 0.006**2, 0.002**2])
     expected = np.linalg.inv(np.linalg.inv(INDEPENDENT_SHARE * I) + floor)
-    np.testing.assert_allclose(closure_information(I), expected, rtol=1e-6, atol=1e-3)
+    np.testing.assert_allclose(observed_information(I), expected, rtol=1e-6, atol=1e-3)
 
 
 def test_nothing_seen_is_nothing_said() -> None:
-    np.testing.assert_array_equal(closure_information(np.zeros((3, 3))), np.zeros((3, 3)))
+    np.testing.assert_array_equal(observed_information(np.zeros((3, 3))), np.zeros((3, 3)))
 
 
 def test_a_moved_constraint_keeps_what_was_measured() -> None:

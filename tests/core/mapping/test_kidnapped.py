@@ -106,7 +106,7 @@ def play(scans: list[SimulatedScan]) -> Mapped:
     withdrawn: list[str] = []
     for n, s in enumerate(scans):
         changes = mapper.add(s.robot, s.scan)
-        withdrawn += changes.withdrawn
+        withdrawn += [c.id for c in changes.withdrawn]
         if changes.started_component:
             started.append(n)
     return Mapped(mapper.view(), started, withdrawn)

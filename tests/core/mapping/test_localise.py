@@ -139,7 +139,7 @@ def test_asking_changes_nothing_and_is_repeatable(
     run = [s.scan for s in asked[40:100]]
     first = mapper.localise(run)
     assert same(first, mapper.localise(run))
-    assert same(first, SiteMapper.restore(snapshot).localise(run))
+    assert same(first, SiteMapper.resume(snapshot).localise(run))
     assert fingerprint(mapper.view()) == before
     assert mapper.snapshot() == snapshot
 

@@ -69,7 +69,7 @@ def test_fading_survives_a_restart(crowded: list[SimulatedScan]) -> None:
     half = len(crowded) // 2
     straight = SiteMapper()
     feed(straight, crowded[:half])
-    resumed = SiteMapper.restore(straight.snapshot())
+    resumed = SiteMapper.resume(straight.snapshot())
     for mapper in (straight, resumed):
         feed(mapper, crowded[half:])
     assert fingerprint(straight.view()) == fingerprint(resumed.view())

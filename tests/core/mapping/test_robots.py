@@ -144,8 +144,8 @@ def test_a_forgotten_robot_is_gone_and_may_come_back(drive: list[SimulatedScan])
     assert back.robots["other"].scans_processed == 30
     assert not {k.id for k in back.keyframes if k.robot == "other"} & numbers
     # And all of it again from a snapshot, as a restart would do it.
-    restored = SiteMapper.restore(mapper.snapshot())
-    assert fingerprint(restored.view()) == fingerprint(back)
+    resumed = SiteMapper.resume(mapper.snapshot())
+    assert fingerprint(resumed.view()) == fingerprint(back)
 
 
 def test_forgetting_one_of_two_keeps_the_others_own_map(drive: list[SimulatedScan]) -> None:

@@ -39,7 +39,7 @@ def test_a_false_meeting_is_withdrawn_when_later_scans_contradict_it() -> None:
         changes = mapper.add(s.robot, s.scan)
         if changes.merges:
             ever_false = ever_false or bool(judge.verdict(mapper.view()).false)
-        withdrawn += changes.withdrawn
+        withdrawn += [c.id for c in changes.withdrawn]
     assert ever_false, "the fleet is no test: nothing false was believed"
     assert withdrawn
     verdict = judge.verdict(mapper.view())
@@ -61,7 +61,7 @@ def test_a_false_meeting_is_withdrawn_when_later_scans_contradict_it() -> None:
 
     # And what an operator restores is not withdrawn again.
     first = next(name for name in withdrawn if name in mapper.verdicts.withdrawn)
-    mapper.reinstate(first)
+    mapper.restore(first)
     assert first not in mapper.verdicts.withdrawn
     assert first in mapper.verdicts.approved
 

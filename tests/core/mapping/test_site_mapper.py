@@ -26,7 +26,7 @@ from lineloom_core.mapping.site_mapper import SiteMapper
 sys.path.insert(0, sys.argv[1])
 from tests.core.mapping.drives import feed, fingerprint
 snapshot, rest = pickle.load(sys.stdin.buffer)
-mapper = SiteMapper.restore(snapshot) if snapshot else SiteMapper()
+mapper = SiteMapper.resume(snapshot) if snapshot else SiteMapper()
 feed(mapper, rest)
 print(hashlib.sha256(repr(fingerprint(mapper.view())).encode()).hexdigest())
 """
@@ -75,7 +75,7 @@ def test_going_on_from_a_snapshot_gives_the_same_bits(
 ) -> None:
     half = int(share * len(log))
     snapshot = mapped(log[:half]).snapshot()
-    resumed = SiteMapper.restore(snapshot)
+    resumed = SiteMapper.resume(snapshot)
     feed(resumed, log[half:])
     assert fingerprint(resumed.view()) == fingerprint(whole)
 
@@ -89,7 +89,7 @@ def test_how_long_chapters_are_changes_nothing(log: list[SimulatedScan], whole: 
     for mapper in mappers:
         mapper.retract(met)
         mapper.forget("robot-1")
-        mapper.reinstate(met)
+        mapper.restore(met)
         feed(mapper, log[50:150])  # late, or of a robot that was forgotten
     short, long = (fingerprint(mapper.view()) for mapper in mappers)
     assert short == long
@@ -104,7 +104,7 @@ def test_a_later_snapshot_repeats_no_chapter(log: list[SimulatedScan], whole: Si
     second = mapper.snapshot(known=first.end)
     assert 0 < first.end < second.end
     together = Snapshot(second.state, 0, (*first.chapters, *second.chapters))
-    resumed = SiteMapper.restore(together)
+    resumed = SiteMapper.resume(together)
     assert fingerprint(resumed.view()) == fingerprint(whole)
     assert resumed.snapshot().chapters == together.chapters
 
@@ -115,9 +115,9 @@ def test_a_snapshot_without_its_chapters_is_named(log: list[SimulatedScan]) -> N
     whole = mapper.snapshot()
     for chapters in ((), whole.chapters[:-1], (*whole.chapters[:-1], b"damaged")):
         with pytest.raises(SnapshotError):
-            SiteMapper.restore(Snapshot(whole.state, 0, chapters))
+            SiteMapper.resume(Snapshot(whole.state, 0, chapters))
     with pytest.raises(SnapshotError):
-        SiteMapper.restore(mapper.snapshot(known=1))
+        SiteMapper.resume(mapper.snapshot(known=1))
 
 
 def test_a_fresh_process_with_other_hashes_ends_with_the_same_bits(
@@ -131,11 +131,11 @@ def test_a_fresh_process_with_other_hashes_ends_with_the_same_bits(
     assert resumed == from_scratch
 
 
-def test_a_restored_mapper_answers_at_once(log: list[SimulatedScan]) -> None:
+def test_a_resumed_mapper_answers_at_once(log: list[SimulatedScan]) -> None:
     mapper = mapped(log[:200])
-    restored = SiteMapper.restore(mapper.snapshot())
-    assert restored.version == mapper.version == 200
-    assert fingerprint(restored.view()) == fingerprint(mapper.view())
+    resumed = SiteMapper.resume(mapper.snapshot())
+    assert resumed.version == mapper.version == 200
+    assert fingerprint(resumed.view()) == fingerprint(mapper.view())
 
 
 @pytest.mark.parametrize("data", [b"", b"no pickle", pickle.dumps(("only", "two")), None])
@@ -143,7 +143,7 @@ def test_an_unreadable_snapshot_is_named(data: bytes | None) -> None:
     if data is None:  # right shape, another version's format
         data = pickle.dumps((-1, *pickle.loads(SiteMapper().snapshot().state)[1:]))
     with pytest.raises(SnapshotError):
-        SiteMapper.restore(Snapshot(data))
+        SiteMapper.resume(Snapshot(data))
 
 
 def test_looking_changes_nothing(log: list[SimulatedScan], whole: SiteView) -> None:

@@ -245,15 +245,15 @@ def share_mapped(view: SiteView, T_world_map: Pose) -> float:
 def test_a_snapshot_of_a_thinned_map_goes_on_bit_by_bit(
     kept: Kept, long_drive: list[SimulatedScan]
 ) -> None:
-    restored = SiteMapper.restore(kept.half)
-    feed(restored, long_drive[restored.version :])
-    assert fingerprint(restored.view()) == fingerprint(kept.mapper.view())
+    resumed = SiteMapper.resume(kept.half)
+    feed(resumed, long_drive[resumed.version :])
+    assert fingerprint(resumed.view()) == fingerprint(kept.mapper.view())
 
 
 def test_undo_in_a_thinned_map_is_as_if_it_had_never_been_believed(
     kept: Kept, long_drive: list[SimulatedScan]
 ) -> None:
-    mapper = SiteMapper.restore(kept.half)
+    mapper = SiteMapper.resume(kept.half)
     so_far = mapper.version
     name = next(
         c.id

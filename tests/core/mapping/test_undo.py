@@ -28,7 +28,7 @@ def snapshot(log: list[SimulatedScan]) -> Snapshot:
 
 @pytest.fixture
 def mapper(snapshot: Snapshot) -> SiteMapper:
-    return SiteMapper.restore(snapshot)
+    return SiteMapper.resume(snapshot)
 
 
 def accepted(view: SiteView, kind: str) -> list[ConstraintView]:
@@ -102,12 +102,12 @@ def test_restoring_gives_the_map_back_bit_for_bit(mapper: SiteMapper) -> None:
     before = mapper.view()
     name = recognised(before).id
     mapper.retract(name)
-    mapper.reinstate(name)
+    mapper.restore(name)
     assert fingerprint(replace(mapper.view(), version=0)) == fingerprint(replace(before, version=0))
 
 
 def test_order_of_retractions_does_not_matter(snapshot: Snapshot) -> None:
-    mappers = [SiteMapper.restore(snapshot) for _ in range(2)]
+    mappers = [SiteMapper.resume(snapshot) for _ in range(2)]
     view = mappers[0].view()
     names = [accepted(view, "loop")[0].id, recognised(view).id]
     for mapper, order in zip(mappers, (names, names[::-1]), strict=True):
@@ -118,8 +118,8 @@ def test_order_of_retractions_does_not_matter(snapshot: Snapshot) -> None:
 
 def test_verdicts_survive_a_snapshot(mapper: SiteMapper) -> None:
     mapper.retract(recognised(mapper.view()).id)
-    restored = SiteMapper.restore(mapper.snapshot())
-    assert fingerprint(restored.view()) == fingerprint(mapper.view())
+    resumed = SiteMapper.resume(mapper.snapshot())
+    assert fingerprint(resumed.view()) == fingerprint(mapper.view())
 
 
 def test_a_retracted_step_cuts_the_track(mapper: SiteMapper, log: list[SimulatedScan]) -> None:
@@ -136,7 +136,7 @@ def test_unknown_and_repeated_actions_only_count(mapper: SiteMapper) -> None:
     name = recognised(mapper.view()).id
     mapper.retract(name)
     before = mapper.view()
-    for act, what in ((mapper.retract, name), (mapper.retract, "p1-2"), (mapper.reinstate, "s3")):
+    for act, what in ((mapper.retract, name), (mapper.retract, "p1-2"), (mapper.restore, "s3")):
         act(what)
     after = mapper.view()
     assert after.version == before.version + 3

@@ -33,7 +33,7 @@ def _bounds(c: Constraint, config: MapperConfig) -> dict[str, _Bounds]:
             "conflict_share": (None, tracker.most_conflict),
         }
     if c.place_a < 0:
-        closure = config.closure
+        closure = config.near_loops
         return {
             "fit": (closure.least_fit, None),
             "conflict_share": (None, closure.most_conflict),

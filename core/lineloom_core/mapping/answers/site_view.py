@@ -110,10 +110,10 @@ class KeyframeView:
 
 
 @dataclass(frozen=True, slots=True)
-class SubmapView:
-    """The last metres of a robot's way at one time, as places are recognised by them.
+class PlaceView:
+    """The last metres of a robot's way at one time, by which it is recognised (`Place`).
 
-    anchor: the keyframe whose frame is the submap's. keyframes: all of them, in driving order.
+    anchor: the keyframe whose frame is its own. keyframes: all of them, in driving order.
     """
 
     id: int
@@ -163,4 +163,4 @@ class SiteView:
     lines: tuple[MapLine, ...]
     keyframes: tuple[KeyframeView, ...]
     constraints: tuple[ConstraintView, ...]
-    submaps: tuple[SubmapView, ...] = ()
+    places: tuple[PlaceView, ...] = ()

@@ -12,9 +12,9 @@ from lineloom_core.mapping.answers.site_view import (
     ComponentView,
     ConstraintView,
     KeyframeView,
+    PlaceView,
     RobotView,
     SiteView,
-    SubmapView,
 )
 from lineloom_core.mapping.answers.trajectories import Trajectories, Way, Whereabouts
 from lineloom_core.mapping.belief.site_map import SiteMap
@@ -34,7 +34,7 @@ def build_view(site: SiteMap, robots: dict[str, RobotRecord], version: int) -> S
         lines=fused_lines(site, component_of),
         keyframes=_keyframes(site, component_of),
         constraints=_constraints(site),
-        submaps=_submaps(site),
+        places=_places(site),
     )
 
 
@@ -138,9 +138,9 @@ def _keyframes(site: SiteMap, component_of: dict[int, str]) -> tuple[KeyframeVie
     )
 
 
-def _submaps(site: SiteMap) -> tuple[SubmapView, ...]:
+def _places(site: SiteMap) -> tuple[PlaceView, ...]:
     return tuple(
-        SubmapView(
+        PlaceView(
             id=place.id,
             robot=site.keyframes[place.anchor].robot,
             anchor=place.anchor,

@@ -23,10 +23,10 @@ CONSTRAINT_FLOOR = np.diag([0.05**2, 0.05**2, 0.01**2])
 class Constraint:
     """T_a_b between two keyframes and its state.
 
-    id: made of what is compared (`step_id`, `closure_id`, `recognition_id`), so that the same pair
-    has the same name however often the history is gone through. information: 3x3 in the tangent
-    at b. place_a, place_b: the places it came from, -1 where it came from two keyframes alone.
-    evidence: metres of wall that speak for it. history: how it came to its state.
+    id: made of what is compared (`step_id`, `near_loop_id`, `recognition_id`), so that the same
+    pair has the same name however often the history is gone through. information: 3x3 in the
+    tangent at b. place_a, place_b: the places it came from, -1 where it came from two keyframes
+    alone. evidence: metres of wall that speak for it. history: how it came to its state.
     """
 
     id: str
@@ -85,7 +85,7 @@ def step_id(keyframe: int) -> str:
     return f"s{keyframe}"
 
 
-def closure_id(older: int, newer: int) -> str:
+def near_loop_id(older: int, newer: int) -> str:
     """Id of a loop between two keyframes that the graph predicted to be near each other."""
     return f"n{older}-{newer}"
 

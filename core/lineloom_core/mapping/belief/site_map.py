@@ -48,7 +48,7 @@ class SiteMap:
         self.merged_into: dict[str, str] = {}
         self.looped_tracks: dict[str, None] = {}
         self.unsolved: dict[int, int] = {}
-        """By component root: closures accepted since it was last solved."""
+        """By component root: loops accepted since it was last solved."""
         self.overlaps: dict[tuple[str, str], tuple[int, int, int]] = {}
         """By pair of tracks since they met: steady points that both saw, those that one missed, and
         pairs of places compared (`contradictions`)."""

@@ -35,7 +35,7 @@ def step_information(
     return _symmetric(np.linalg.inv(covariance))
 
 
-def closure_information(registered: NDArray[np.float64]) -> NDArray[np.float64]:
+def observed_information(registered: NDArray[np.float64]) -> NDArray[np.float64]:
     """Information of a loop or rendezvous: only what is really observed, the floor added."""
     seen = project_out_weak(INDEPENDENT_SHARE * registered)
     # (seen^-1 + floor)^-1 without inverting the singular: W = S - S (S + F^-1)^-1 S.

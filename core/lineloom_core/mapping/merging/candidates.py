@@ -2,7 +2,7 @@
 
 Steps of `consider`: 1. recognise the new place among those of other components, and among those
 of its own that may be here given the drift; 2. keep what passes as candidates; 3. let joining and
-looping decide which sets of candidates to believe. Nothing is believed on a single match.
+wide loops decide which sets of candidates to believe. Nothing is believed on a single match.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from lineloom_core.mapping.belief.constraint import (
 )
 from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.facts.drift import reach
-from lineloom_core.mapping.facts.information import closure_information, turned
+from lineloom_core.mapping.facts.information import observed_information, turned
 from lineloom_core.mapping.merging.component_merged import ComponentMerged
 from lineloom_core.mapping.merging.joining import join
-from lineloom_core.mapping.merging.wide_loops import close_loops
+from lineloom_core.mapping.merging.wide_loops import close_wide_loops
 from lineloom_core.places import Place, Recognition
 
 _REFUSED_KEPT = 3
@@ -43,7 +43,7 @@ def consider(site: SiteMap, place: Place) -> tuple[list[ComponentMerged], bool]:
     roots = sorted({site.component_root(c.keyframe_a) for c in fresh})
     for root in roots:
         if root == site.component_root(place.anchor):
-            moved = close_loops(site, place) or moved
+            moved = close_wide_loops(site, place) or moved
         else:
             merged = join(site, root, place.anchor)
             if merged is not None:
@@ -77,7 +77,7 @@ def _worth_trying(site: SiteMap, place: Place) -> list[Place]:
 
 def _lies_apart(site: SiteMap, other: Place, place: Place) -> bool:
     driven = site.driven_between(other.anchor, place.anchor)
-    return driven > site.config.closure.apart + site.config.places.span
+    return driven > site.config.near_loops.apart + site.config.places.span
 
 
 def _try(site: SiteMap, reference: Place, current: Place) -> Constraint | None:
@@ -128,4 +128,4 @@ def _information_at(found: Recognition, current: Place, keyframe: int) -> NDArra
     T_anchor_keyframe = current.poses[current.keyframes.index(keyframe)]
     # xi_anchor = Ad(T_anchor_keyframe) xi_keyframe for a rigid place.
     A = T_anchor_keyframe.adjoint()
-    return closure_information(A.T @ at_anchor @ A)
+    return observed_information(A.T @ at_anchor @ A)

@@ -8,18 +8,18 @@ cannot glue similar places together: a window of a few decimetres holds no secon
 from __future__ import annotations
 
 from lineloom_core.geometry import Pose, angle_difference
-from lineloom_core.mapping.belief.constraint import Constraint, closure_id
+from lineloom_core.mapping.belief.constraint import Constraint, near_loop_id
 from lineloom_core.mapping.belief.site_map import SiteMap
-from lineloom_core.mapping.facts.information import closure_information, turned
+from lineloom_core.mapping.facts.information import observed_information, turned
 from lineloom_core.mapping.facts.keyframe import Keyframe
 from lineloom_core.matching.free_space import judge_sweeps
 from lineloom_core.matching.local_map import Cloud, LocalMap
 
 
-def close_nearby(site: SiteMap, keyframe: int) -> Constraint | None:
+def close_near_loop(site: SiteMap, keyframe: int) -> Constraint | None:
     """Try to tie a keyframe to an older part of its component; return the accepted constraint."""
     older = _partner(site, keyframe)
-    if older is None or site.verdicts.barred(closure_id(older, keyframe)):
+    if older is None or site.verdicts.barred(near_loop_id(older, keyframe)):
         return None
     found = _register(site, older, keyframe)
     if found is not None:
@@ -29,7 +29,7 @@ def close_nearby(site: SiteMap, keyframe: int) -> Constraint | None:
 
 def _partner(site: SiteMap, keyframe: int) -> int | None:
     """The nearest keyframe that looks the same way and is not of the recent past."""
-    config = site.config.closure
+    config = site.config.near_loops
     here = site.pose(keyframe)
     best: tuple[float, int] | None = None
     for other, distance in site.nearby(keyframe, config.radius):
@@ -46,12 +46,12 @@ def _partner(site: SiteMap, keyframe: int) -> int | None:
 
 def _apart(site: SiteMap, older: int, newer: int) -> bool:
     same = site.same_track(older, newer)
-    return not same or site.driven_between(older, newer) > site.config.closure.apart
+    return not same or site.driven_between(older, newer) > site.config.near_loops.apart
 
 
 def _register(site: SiteMap, older: int, newer: int) -> Constraint | None:
     """Register the newer keyframe in the surroundings of the older one and check the outcome."""
-    config = site.config.closure
+    config = site.config.near_loops
     a, b = site.keyframes[older], site.keyframes[newer]
     surroundings = LocalMap.build(_clouds_around(site, a))
     predicted = site.pose(older).between(site.pose(newer))
@@ -73,13 +73,13 @@ def _register(site: SiteMap, older: int, newer: int) -> Constraint | None:
     ):
         return None
     return Constraint(
-        id=closure_id(older, newer),
+        id=near_loop_id(older, newer),
         kind="loop",
         state="accepted",
         keyframe_a=older,
         keyframe_b=newer,
         T_a_b=found.pose,
-        information=closure_information(turned(found.information, found.pose.theta)),
+        information=observed_information(turned(found.information, found.pose.theta)),
         reason="the graph predicted it and the scans agree",
         checks=checks,
         evidence=found.matched * 0.05,

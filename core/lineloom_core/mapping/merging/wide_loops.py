@@ -16,7 +16,7 @@ from lineloom_core.mapping.facts.drift import reach
 from lineloom_core.places import Place
 
 
-def close_loops(site: SiteMap, place: Place) -> bool:
+def close_wide_loops(site: SiteMap, place: Place) -> bool:
     """Accept loop candidates that agree with the graph's drift and with each other."""
     root = site.component_root(place.anchor)
     candidates = [

@@ -34,7 +34,7 @@ export class SiteState {
     this.keyframes = keyframes;
     /** @type {Map<string, ConstraintAnswer>} */
     this.constraints = new Map(constraints.map((c) => [c.id, c]));
-    this.submaps = graph.graph.submaps ?? [];
+    this.places = graph.graph.submaps ?? [];
     this.paths = paths;
     this.components = componentsOf(this);
   }

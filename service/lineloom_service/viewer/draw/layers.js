@@ -2,7 +2,7 @@
  * What is shown. Constraints are chosen by their state.
  *
  * @typedef {{lines: boolean, trajectories: boolean, robots: boolean, ellipses: boolean,
- *   keyframes: boolean, submaps: boolean, accepted: boolean, candidate: boolean,
+ *   keyframes: boolean, places: boolean, accepted: boolean, candidate: boolean,
  *   rejected: boolean, retracted: boolean, grid: boolean}} LayerChoice
  */
 
@@ -13,7 +13,7 @@ export const DEFAULT_LAYERS = Object.freeze({
   robots: true,
   ellipses: true,
   keyframes: false,
-  submaps: false,
+  places: false,
   accepted: false,
   candidate: true,
   rejected: false,
@@ -28,7 +28,7 @@ export const LAYER_NAMES = [
   ["robots", "Robots"],
   ["ellipses", "Uncertainty (95 %)"],
   ["keyframes", "Keyframes"],
-  ["submaps", "Submaps"],
+  ["places", "Places"],
   ["grid", "Grid"],
 ];
 

@@ -1,7 +1,7 @@
 import { paintConstraints } from "./constraint_painter.js";
 import { paintKeyframes } from "./keyframe_painter.js";
 import { paintLines } from "./wall_painter.js";
-import { paintPaths, paintSubmaps } from "./way_painter.js";
+import { paintPaths, paintPlaces } from "./way_painter.js";
 
 /**
  * Draw what moves only when the map does, in steps: the generator yields after every few
@@ -14,7 +14,7 @@ import { paintPaths, paintSubmaps } from "./way_painter.js";
 export function* paint(context, scene, view, every = 1) {
   context.lineCap = "round";
   context.lineJoin = "round";
-  if (scene.layers.submaps) yield* paintSubmaps(context, scene, view);
+  if (scene.layers.places) yield* paintPlaces(context, scene, view);
   if (scene.layers.trajectories) yield* paintPaths(context, scene, view);
   if (scene.layers.lines) yield* paintLines(context, scene, view, every);
   if (scene.layers.keyframes) yield* paintKeyframes(context, scene, view);

@@ -21,15 +21,15 @@ export function* paintPaths(context, { state, placement, palette }, view) {
   context.globalAlpha = 1;
 }
 
-/** A submap is a band along its keyframes. @param {any} context @param {Scene} scene @param {View} view */
-export function* paintSubmaps(context, { state, placement, palette }, view) {
+/** A place is a band along its keyframes. @param {any} context @param {Scene} scene @param {View} view */
+export function* paintPlaces(context, { state, placement, palette }, view) {
   context.globalAlpha = 0.13;
   context.lineWidth = Math.max(0.9 * view.scale, 5);
-  for (const submap of state.submaps) {
-    const nodes = submap.keyframes.map((id) => state.keyframes.get(id)).filter((n) => n);
+  for (const place of state.places) {
+    const nodes = place.keyframes.map((id) => state.keyframes.get(id)).filter((n) => n);
     const pose = placement.get(nodes[0]?.component ?? "");
     if (!pose) continue;
-    context.strokeStyle = palette.robot(state.robotNames.indexOf(submap.robot));
+    context.strokeStyle = palette.robot(state.robotNames.indexOf(place.robot));
     context.beginPath();
     const points = nodes.flatMap((node) => [node?.x ?? 0, node?.y ?? 0]);
     polyline(context, Float32Array.from(points), toPixels(pose, view));

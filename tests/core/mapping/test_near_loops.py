@@ -1,4 +1,4 @@
-"""Closing loops where the graph predicts them: right when right, refused when not."""
+"""Loops where the graph predicts them: right when right, refused when not."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from lineloom_core.geometry import Pose
 from lineloom_core.mapping.belief.constraint import Constraint
 from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.config import MapperConfig
-from lineloom_core.mapping.merging.near_loops import close_nearby
+from lineloom_core.mapping.merging.near_loops import close_near_loop
 from lineloom_lab.simulation import SimulatedScan, rooms
 
 from tests.core.mapping.drives import covered, legs, scans_of
@@ -33,11 +33,11 @@ def lay_with_error(site: SiteMap, scans: list[SimulatedScan], error: Pose) -> li
 
 
 def close_all(site: SiteMap, ids: list[int]) -> list[Constraint]:
-    return [found for k in ids if (found := close_nearby(site, k)) is not None]
+    return [found for k in ids if (found := close_near_loop(site, k)) is not None]
 
 
 @pytest.mark.parametrize("error", [Pose(0, 0, 0), Pose(0.25, -0.2, 0.0), Pose(0.0, 0.1, 0.03)])
-def test_closures_measure_the_true_pose_whatever_the_graph_believed(
+def test_near_loops_measure_the_true_pose_whatever_the_graph_believed(
     there_and_back: list[SimulatedScan], error: Pose
 ) -> None:
     site = SiteMap(MapperConfig())
@@ -60,7 +60,7 @@ def test_closures_measure_the_true_pose_whatever_the_graph_believed(
 def test_partners_are_far_apart_in_time_and_near_in_space(
     there_and_back: list[SimulatedScan],
 ) -> None:
-    config = MapperConfig().closure
+    config = MapperConfig().near_loops
     site = SiteMap(MapperConfig())
     ids = lay_track(site, there_and_back)
     for c in close_all(site, ids):
