@@ -38,7 +38,8 @@ def server_process(
 ) -> Iterator[subprocess.Popen[bytes]]:
     """Start a server, whatever comes of it; it is killed in the end."""
     command = [sys.executable, str(SERVER), str(directory), str(port)]
-    values = {**os.environ, "PYTHONPATH": str(SERVER.parent), **environment}
+    path = os.pathsep.join([str(SERVER.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
+    values = {**os.environ, "PYTHONPATH": path, **environment}
     with subprocess.Popen(command, env=values) as process:
         try:
             yield process
