@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 import logging
 
-import lineloom_core
 from lineloom_core.mapping.answers.site_view import SiteView
+from lineloom_core.mapping.config import MapperConfig
+from lineloom_core.mapping.digest import digest
 
 from lineloom_service.body_budget import BodyBudget
 from lineloom_service.engine.conductor import Conductor
@@ -51,7 +52,7 @@ class Service:
         )
         self.events = EventHub()
         recorder = EventRecorder(
-            self.store, self.events, lineloom_core.__version__, settings.event_history
+            self.store, self.events, digest(MapperConfig()), settings.event_history
         )
         self.conductor = Conductor(self.store, self.engine, settings, recorder)
         self.pacer = Pacer()

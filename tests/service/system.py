@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 from lineloom_core.mapping.answers.site_view import SiteView
+from lineloom_core.mapping.config import MapperConfig
+from lineloom_core.mapping.digest import digest
 from lineloom_core.scan import Scan
 from lineloom_service.engine.conductor import Conductor
 from lineloom_service.engine.local_engine import LocalEngine
@@ -20,6 +22,8 @@ from lineloom_service.store.records import NewScan
 from lineloom_service.store.sql_store import SqlStore
 
 FAKE = "fake_mapper:FakeMapper"
+PRODUCER = digest(MapperConfig())
+"""What snapshots are keyed by."""
 
 
 def new_scan(seq: int, stamp: float | None = None) -> NewScan:

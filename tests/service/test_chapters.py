@@ -23,9 +23,9 @@ from lineloom_service.store.records import LogEntry, SnapshotRecord, StoreError
 from lineloom_service.store.sql_store import SqlStore
 
 from tests.service.fake_mapper import SEALED, FakeMapper
-from tests.service.system import FAKE, System, fingerprint, new_scan, running, started
+from tests.service.system import FAKE, PRODUCER, System, fingerprint, new_scan, running, started
 
-SITE, PRODUCER, SCANS = 1, "0.1.0", 200
+SITE, SCANS = 1, 200
 
 
 def _undisturbed(count: int = SCANS) -> FakeMapper:

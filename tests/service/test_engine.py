@@ -17,7 +17,7 @@ from lineloom_service.engine.local_engine import LocalEngine
 from lineloom_service.store.codec import decode_scan, encode_mount, encode_scan
 from lineloom_service.store.records import SnapshotRecord
 
-from tests.service.system import System, fingerprint, running
+from tests.service.system import PRODUCER, System, fingerprint, running
 
 RAISES, CRASHES, RAISES_ONCE, HANGS = 666.0, 667.0, 668.0, 669.0
 DATABASE_URL: str | None = None
@@ -108,7 +108,7 @@ async def test_a_restart_goes_on_from_the_snapshot(
     async with _running(tmp_path) as system:
         published = await system.caught_up()
         assert (published.position, published.scans) == (120, 120)
-        snapshot = await system.store.latest_snapshot(1, "0.1.0")
+        snapshot = await system.store.latest_snapshot(1, PRODUCER)
         assert snapshot is not None
         assert snapshot.position == 120  # saved when the first service stopped
         await system.post(range(120, 200))
@@ -121,7 +121,7 @@ async def test_an_unreadable_snapshot_is_dropped_and_the_log_replayed(
     async with _running(tmp_path) as system:
         await system.post(range(200))
         await system.caught_up()
-        await system.store.save_snapshot(1, SnapshotRecord(200, 200, "0.1.0", b"rubbish"))
+        await system.store.save_snapshot(1, SnapshotRecord(200, 200, PRODUCER, b"rubbish"))
     async with _running(tmp_path) as system:
         assert fingerprint((await system.caught_up()).view) == undisturbed
 
@@ -194,10 +194,10 @@ async def test_an_idle_site_is_saved(tmp_path: Path) -> None:
         await system.post(range(5))
         await system.caught_up()
         for _ in range(200):
-            if await system.store.latest_snapshot(1, "0.1.0"):
+            if await system.store.latest_snapshot(1, PRODUCER):
                 break
             await asyncio.sleep(0.02)
-        snapshot = await system.store.latest_snapshot(1, "0.1.0")
+        snapshot = await system.store.latest_snapshot(1, PRODUCER)
         assert snapshot is not None
         assert (snapshot.position, snapshot.scans) == (5, 5)
 

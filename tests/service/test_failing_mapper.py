@@ -19,6 +19,8 @@ from lineloom_service.store.records import NewScan, SnapshotRecord, StoreError
 from lineloom_service.store.sql_store import SqlStore
 from lineloom_service.store.sqlite_database import SqliteDatabase
 
+from tests.service.system import PRODUCER
+
 UNSEEN, UNSAVED = 670.0, 671.0
 SITE = 1
 
@@ -58,7 +60,7 @@ async def _until(done: Callable[[], bool]) -> None:
 
 
 async def _saved(store: SqlStore) -> int:
-    snapshot = await store.latest_snapshot(SITE, "0.1.0")
+    snapshot = await store.latest_snapshot(SITE, PRODUCER)
     return 0 if snapshot is None else snapshot.position
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lineloom_core.features import _circle_kernels, _kernels
+from lineloom_core.parameters import parameter
 from lineloom_core.scan import Scan
 
 CHORD_REACH = 0.09
@@ -17,26 +18,30 @@ CHORD_REACH = 0.09
 
 @dataclass(frozen=True, slots=True)
 class ExtractionConfig:
-    """Parameters of feature extraction; lengths in metres, angles in radians.
+    """Line segments, corners and circles of a scan (thesis chapter 3)."""
 
-    sigma: range noise. break_angle: flattest incidence still taken for one surface (adaptive
-    break points, lambda). split: Algorithm 1's threshold t. merge_factor: collinear neighbours
-    are merged when their joint maximum deviation stays below merge_factor * split.
-    max_gap_beams: beams without a return that do not break a surface. max_gap: how far apart two
-    collinear runs may lie to be merged all the same. corner_reach: how far an angle
-    edge may lie from the ends of its two lines. min_circle_points: fewest points of a circle.
-    """
-
-    sigma: float = 0.015
-    break_angle: float = math.radians(8.0)
-    split: float = 0.065
-    merge_factor: float = 0.8
-    min_points: int = 5
-    min_length: float = 0.2
-    max_gap_beams: int = 6
-    max_gap: float = 0.3
-    corner_reach: float = 0.35
-    min_circle_points: int = 7
+    sigma: float = parameter(0.015, "m", "range noise of the lidar", 1e-4, 1.0)
+    break_angle: float = parameter(
+        math.radians(8.0),
+        "rad",
+        "flattest incidence still taken for one surface (lambda)",
+        0.0,
+        1.5,
+    )
+    split: float = parameter(0.065, "m", "threshold t of Algorithm 1", 1e-3, 10.0)
+    merge_factor: float = parameter(
+        0.8, "", "neighbours are collinear whose joint deviation is below this times `split`"
+    )
+    min_points: int = parameter(5, "points", "fewest of a line", 2)
+    min_length: float = parameter(0.2, "m", "shortest line")
+    max_gap_beams: int = parameter(6, "beams", "without a return that do not break a surface")
+    max_gap: float = parameter(
+        0.3, "m", "how far apart collinear runs may lie to be one line all the same"
+    )
+    corner_reach: float = parameter(
+        0.35, "m", "how far a corner may lie from the ends of its two lines"
+    )
+    min_circle_points: int = parameter(7, "points", "fewest of a circle", 3)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lineloom_core.fusion import _kernels as kernels
 from lineloom_core.fusion.segment_map import LineObservations
+from lineloom_core.parameters import parameter
 
 _LEAST_SIGMA_M = 1e-3  # no lidar line is better known than that; keeps weights comparable
 _MAX_ROUNDS = 8
@@ -17,24 +18,24 @@ _MAX_ROUNDS = 8
 
 @dataclass(frozen=True, slots=True)
 class FusionConfig:
-    """When two segments are one wall, and which walls are kept.
+    """When two segments are one wall, and which walls are kept."""
 
-    max_angle: between directions [rad]; they are oriented, so the two faces of a thin wall never
-    merge. max_offset: across, where they overlap [m]. max_gap: along [m]. max_spread: rms distance
-    of the merged mass from its line [m]; keeps the chords of a curved wall apart. min_length,
-    min_support: walls shorter [m] or seen by fewer keyframes are dropped. min_length_alone: the
-    same for walls seen by one keyframe only. end_slack: where at least four keyframes saw a wall,
-    one observation that overshoots its end by less than this [m] does not move the end.
-    """
-
-    max_angle: float = math.radians(6.0)
-    max_offset: float = 0.08
-    max_gap: float = 0.15
-    max_spread: float = 0.05
-    min_length: float = 0.2
-    min_support: int = 1
-    min_length_alone: float = 0.2
-    end_slack: float = 0.3
+    max_angle: float = parameter(
+        math.radians(6.0),
+        "rad",
+        "between directions; they are oriented, so a thin wall's faces stay two",
+    )
+    max_offset: float = parameter(0.08, "m", "across, where they overlap")
+    max_gap: float = parameter(0.15, "m", "along")
+    max_spread: float = parameter(
+        0.05, "m", "rms distance of a wall's mass from its line; keeps a curve's chords apart"
+    )
+    min_length: float = parameter(0.2, "m", "shorter walls are dropped")
+    min_support: int = parameter(1, "keyframes", "walls that fewer saw are dropped", 1)
+    min_length_alone: float = parameter(0.2, "m", "shorter walls that one keyframe saw are dropped")
+    end_slack: float = parameter(
+        0.3, "m", "by which one of at least four observations overshoots to no effect"
+    )
 
 
 def merge_observations(

@@ -18,30 +18,29 @@ from numpy.typing import NDArray
 
 from lineloom_core.fusion import _persistence_kernels as kernels
 from lineloom_core.fusion.occupancy import Rays
+from lineloom_core.parameters import parameter
 
 
 @dataclass(frozen=True, slots=True)
 class PersistenceConfig:
-    """Parameters; metres.
+    """When a wall that is seen through leaves the map."""
 
-    piece: length of a line's pieces, each judged by itself. reach: how far a sweep counts. near,
-    far: a beam that ends less than `near` off the line (measured across it) has seen it; one that
-    ends more than `far` behind has passed through. loss: what passing through takes from the
-    balance, where seeing adds 1; less than 1, for beams pass through glass at times. most: where
-    the balance saturates. least_hole: shorter gaps between pieces that are left are not cut out.
-    most_sweeps, most_looks: the latest that are asked, and that count; they bound the cost.
-    """
-
-    piece: float = 0.25
-    reach: float = 8.0
-    near: float = 0.15
-    far: float = 0.3
-    loss: float = 0.5
-    most: float = 6.0
-    least_hole: float = 0.45
-    least_length: float = 0.2
-    most_sweeps: int = 200
-    most_looks: int = 40
+    piece: float = parameter(0.25, "m", "length of a line's pieces, each judged by itself", 0.01)
+    reach: float = parameter(8.0, "m", "how far a sweep counts", 0.1)
+    near: float = parameter(
+        0.15, "m", "a beam that ends less off the line, measured across it, has seen it"
+    )
+    far: float = parameter(0.3, "m", "a beam that ends more behind it has passed through")
+    loss: float = parameter(
+        0.5, "", "what passing through takes, where seeing adds 1: there is glass"
+    )
+    most: float = parameter(6.0, "", "where the balance of a piece saturates")
+    least_hole: float = parameter(
+        0.45, "m", "shorter gaps between pieces that are left are not cut out"
+    )
+    least_length: float = parameter(0.2, "m", "shorter remains are dropped")
+    most_sweeps: int = parameter(200, "sweeps", "the latest that are asked; bounds the cost", 1)
+    most_looks: int = parameter(40, "looks", "the latest that count; bounds the cost", 1)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,157 +1,198 @@
-"""All parameters of a site's mapper in one place."""
+"""All parameters of a site's mapper in one place, with what they mean and what they can be."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from lineloom_core.features import ExtractionConfig
 from lineloom_core.fusion import FusionConfig
 from lineloom_core.fusion.persistence import PersistenceConfig
+from lineloom_core.parameters import ParameterError, parameter, with_values
 from lineloom_core.places.recognition import RecognitionConfig
 
 
 @dataclass(frozen=True, slots=True)
 class TrackerConfig:
-    """Parameters of the tracker; metres, radians, seconds.
+    """Following a robot from scan to scan.
 
-    memory: keyframes in the local map; noisy_memory: in that of a robot whose noise figure (see
-    `drift`) lies above noisy_above. keyframe_distance, keyframe_angle: how far to the next
-    keyframe. least_fit: share of a scan that must lie on known surfaces; low, for a turn into a
-    new room shows mostly new walls. enough_fit: below it the scan becomes a keyframe, since so
-    much of it is new. most_conflict: share of it that may lie where the keyframe saw free space;
-    of nearly 90,000 steps of simulated robots among people, none of the right ones had as much.
-    noisy_conflict: the same for a robot whose lidar is noisy: what it sees contradicts itself.
-    patience: unfit scans in a row before the track is given up. longest_gap: silence after which
-    the last step's velocity means nothing, and a scan must fit by gap_fit and conflict by at most
-    gap_conflict. longest_silence: after which a robot may have been carried anywhere.
-    prior_sigma [m, rad]: how far off a prediction is from one scan to the next (5 a second).
-    least_isotropy: smaller over greater information on the position, under which the smaller counts
-    as none. steady_share: of what fits, as much must have stood still to go by that alone.
+    What scans conflict with is judged generously: of nearly 90,000 steps of simulated robots among
+    people, none of the right ones had as much as `most_conflict`.
     """
 
-    memory: int = 8
-    noisy_memory: int = 32
-    noisy_above: float = 1.2
-    keyframe_distance: float = 0.4
-    keyframe_angle: float = math.radians(20.0)
-    least_fit: float = 0.2
-    enough_fit: float = 0.6
-    most_conflict: float = 0.2
-    noisy_conflict: float = 0.3
-    patience: int = 4
-    longest_gap: float = 0.6
-    gap_fit: float = 0.5
-    gap_conflict: float = 0.1
-    longest_silence: float = 10.0
-    prior_sigma: float = 0.1
-    least_isotropy: float = 0.001
-    steady_share: float = 0.5
+    memory: int = parameter(8, "keyframes", "in the local map that scans are held against", 1, 1000)
+    noisy_memory: int = parameter(
+        32, "keyframes", "the same for a robot whose lidar is noisy", 1, 1000
+    )
+    noisy_above: float = parameter(
+        1.2, "", "noise figure (see `drift`) from which a lidar is noisy"
+    )
+    keyframe_distance: float = parameter(0.4, "m", "how far to the next keyframe", 0.01)
+    keyframe_angle: float = parameter(math.radians(20.0), "rad", "turn to the next keyframe", 0.01)
+    least_fit: float = parameter(
+        0.2, "share", "of a scan on known surfaces; a turn into a new room shows mostly new walls"
+    )
+    enough_fit: float = parameter(
+        0.6, "share", "below it so much of the scan is new that it becomes a keyframe"
+    )
+    most_conflict: float = parameter(
+        0.2, "share", "of a scan that may lie where the keyframe saw free space"
+    )
+    noisy_conflict: float = parameter(
+        0.3, "share", "the same for a noisy lidar, which contradicts itself"
+    )
+    patience: int = parameter(
+        4, "scans", "unfit ones in a row before the track is given up", 1, 10_000
+    )
+    longest_gap: float = parameter(
+        0.6, "s", "silence after which the last step's velocity means nothing", 0.001
+    )
+    gap_fit: float = parameter(0.5, "share", "`least_fit` after such a silence")
+    gap_conflict: float = parameter(0.1, "share", "`most_conflict` after such a silence")
+    longest_silence: float = parameter(
+        10.0, "s", "after it a robot may have been carried anywhere", 0.001
+    )
+    prior_sigma: float = parameter(
+        0.1, "m, rad", "how far off a prediction is for the next scan, at 5 a second", 1e-4, 10.0
+    )
+    least_isotropy: float = parameter(
+        0.001, "", "information across over along, below which there is none", 0.0, 1.0
+    )
+    steady_share: float = parameter(
+        0.5, "share", "of what fits that must have stood still to go by that alone"
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class PlaceConfig:
-    """span: metres of way in a place; stride: how far apart places begin; most_keyframes in one.
+    """Places: the submaps that are recognised."""
 
-    shortlist: where more places than this are worth trying, the likeliest are.
-    """
-
-    span: float = 5.0
-    stride: float = 2.5
-    most_keyframes: int = 14
-    least_keyframes: int = 4
-    shortlist: int = 48
+    span: float = parameter(5.0, "m", "of way in a place", 0.1)
+    stride: float = parameter(2.5, "m", "how far apart places begin", 0.1)
+    most_keyframes: int = parameter(14, "keyframes", "in a place", 2, 1000)
+    least_keyframes: int = parameter(4, "keyframes", "in a place", 1, 1000)
+    shortlist: int = parameter(48, "places", "the likeliest, where more are worth trying", 1)
 
 
 @dataclass(frozen=True, slots=True)
 class NearLoopConfig:
-    """Closing loops where the graph already knows that two keyframes are near each other.
+    """Closing loops where the graph already knows that two keyframes are near each other."""
 
-    radius [m], angle [rad]: how near. apart [m]: way driven in between, less is no loop. reach_xy,
-    reach_theta: how wrong the graph may be. The rest: checks as in recognition.
-    """
-
-    radius: float = 2.5
-    angle: float = math.radians(70.0)
-    apart: float = 12.0
-    reach_xy: float = 0.4
-    reach_theta: float = 0.1
-    least_fit: float = 0.6
-    most_conflict: float = 0.08
-    every: int = 2
+    radius: float = parameter(2.5, "m", "how near")
+    angle: float = parameter(math.radians(70.0), "rad", "how much turned")
+    apart: float = parameter(12.0, "m", "way driven in between; less is no loop")
+    reach_xy: float = parameter(0.4, "m", "how wrong the graph may be", 0.01)
+    reach_theta: float = parameter(0.1, "rad", "how wrong the graph may be", 0.001)
+    least_fit: float = parameter(0.6, "share", "of a keyframe on the other's surfaces")
+    most_conflict: float = parameter(0.08, "share", "of it in the other's free space")
+    every: int = parameter(2, "keyframes", "from one that is looked at to the next", 1)
 
 
 @dataclass(frozen=True, slots=True)
 class JoinConfig:
-    """Believing a set of candidate constraints.
+    """Believing a set of candidate constraints, which joins two components."""
 
-    least_set: mutually consistent constraints that join two components. least_places: places in
-    each, so that it is known what else looks alike. least_evidence: metres of wall in the set.
-    lead: how many times the evidence of the best rival set. least_distinctive: constraints of the
-    set whose evidence must be `distinctive` times that of any known mistake about their places.
-    most_missing: share of what stood still for one robot and was not there for the other, over
-    the places of the set; most_map_missing: over all places that would overlap and that drift has
-    moved by less than `rigid_within` [m] against the set. most_doubt: the share of the set if
-    `doubted_points` more were missing: three pieces of furniture, each in a few pairs of places.
-    loop_gate: sigmas of drift within which a loop is believed.
-    """
-
-    least_set: int = 3
-    least_places: int = 3
-    least_evidence: float = 60.0
-    lead: float = 2.0
-    least_distinctive: int = 2
-    distinctive: float = 1.3
-    most_missing: float = 0.018
-    most_map_missing: float = 0.03
-    most_doubt: float = 0.045
-    doubted_points: float = 180.0
-    rigid_within: float = 0.1
-    loop_gate: float = 3.0
-    most_candidates: int = 64
+    least_set: int = parameter(3, "constraints", "mutually consistent ones in the set", 1)
+    least_places: int = parameter(
+        3, "places", "in each component, so that it is known what else looks alike"
+    )
+    least_evidence: float = parameter(60.0, "m", "of wall that the set rests on")
+    lead: float = parameter(2.0, "", "how many times the evidence of the best rival set", 1e-3)
+    least_distinctive: int = parameter(2, "constraints", "of the set that have to be distinctive")
+    distinctive: float = parameter(
+        1.3, "", "evidence of such a one, times that of any known mistake about its places", 1e-3
+    )
+    most_missing: float = parameter(
+        0.018, "share", "of what stood still that the places of the set miss of each other"
+    )
+    most_map_missing: float = parameter(
+        0.03, "share", "the same over all places that would overlap and that drift has not moved"
+    )
+    most_doubt: float = parameter(
+        0.045, "share", "the set's, if `doubted_points` more were missing"
+    )
+    doubted_points: float = parameter(
+        180.0, "points", "three pieces of furniture, each in a few pairs of places"
+    )
+    rigid_within: float = parameter(
+        0.1, "m", "places count for `most_map_missing` that drift has moved less against the set"
+    )
+    loop_gate: float = parameter(3.0, "sigma", "of drift within which a loop is believed")
+    most_candidates: int = parameter(64, "constraints", "that sets are made of", 1, 4096)
 
 
 @dataclass(frozen=True, slots=True)
 class DoubtConfig:
     """When what was believed is withdrawn.
 
-    most_compared: places that a new one is held against. most_missing: share of what stood still
-    for one track and is missing for another, beyond the usual, over at least `least_compared` pairs
-    of places and `least_points` points. most_strain [m], most_turn [rad]: how far the solved graph
-    may be from what a loop says. A place with at least `place_points` judged is right up to
-    `place_right` missing, and wrong from `place_wrong` on; `wrong_in_a_row` of them after a right
-    one mean that tracking slipped. slip [m]: how far aside a place may be found again before it is
-    another one. jump_missing: what may be missing between places two on along one track, over at
-    least jump_points points; real and simulated ones come to 7 % at most, jumps to 10 and more.
+    Between places two on along one track, 7 % at most are missing, in real logs and simulated ones;
+    where tracking jumped, 10 % and more.
     """
 
-    most_compared: int = 6
-    least_compared: int = 6
-    least_points: int = 2000
-    most_missing: float = 0.08
-    most_strain: float = 0.5
-    most_turn: float = 0.12
-    place_points: int = 600
-    place_right: float = 0.03
-    place_wrong: float = 0.1
-    wrong_in_a_row: int = 2
-    slip: float = 1.5
-    jump_missing: float = 0.1
-    jump_points: int = 400
+    most_compared: int = parameter(6, "places", "that a new one is held against")
+    least_compared: int = parameter(6, "pairs", "of places that two tracks are judged by", 1)
+    least_points: int = parameter(2000, "points", "that two tracks are judged by", 1)
+    most_missing: float = parameter(
+        0.08, "share", "of what stood still that two tracks miss of each other, beyond the usual"
+    )
+    most_strain: float = parameter(
+        0.5, "m", "how far the solved graph may be from what a loop says"
+    )
+    most_turn: float = parameter(
+        0.12, "rad", "how far the solved graph may be from what a loop says"
+    )
+    place_points: int = parameter(600, "points", "that a place is judged by", 1)
+    place_right: float = parameter(0.03, "share", "missing of a place that is right")
+    place_wrong: float = parameter(0.1, "share", "missing of a place that is wrong")
+    wrong_in_a_row: int = parameter(2, "places", "after a right one: tracking slipped", 1)
+    slip: float = parameter(
+        1.5, "m", "how far aside a place may be found again before it is another one"
+    )
+    jump_missing: float = parameter(
+        0.1, "share", "missing between places two on along one track: it jumped"
+    )
+    jump_points: int = parameter(400, "points", "that a jump is judged by", 1)
 
 
 @dataclass(frozen=True, slots=True)
 class ThinningConfig:
-    """When places and their keyframes are let go.
+    """When places and their keyframes are let go."""
 
-    most_alike: places kept within `radius` [m] and `angle` [rad] of each other. apart: metres that
-    a robot drives on before any of its latest track is let go.
-    """
+    most_alike: int = parameter(3, "places", "kept within `radius` and `angle` of each other", 2)
+    radius: float = parameter(2.5, "m", "within which places are alike")
+    angle: float = parameter(math.radians(60.0), "rad", "within which places are alike")
+    apart: float = parameter(
+        20.0, "m", "that a robot drives on before any of its latest track is let go"
+    )
 
-    most_alike: int = 3
-    radius: float = 2.5
-    angle: float = math.radians(60.0)
-    apart: float = 20.0
+
+@dataclass(frozen=True, slots=True)
+class LocaliseConfig:
+    """Finding where a scan was taken (`localise`); it changes no map."""
+
+    recognition: RecognitionConfig = field(
+        default_factory=lambda: RecognitionConfig(least_explained=3.0, coarse_keep=12)
+    )
+    spots: int = parameter(
+        10, "hypotheses", "that are held against all that is known around them", 1, 1000
+    )
+    same_distance: float = parameter(0.5, "m", "within which two hypotheses are one")
+    same_angle: float = parameter(0.15, "rad", "within which two hypotheses are one")
+    surround: float = parameter(8.0, "m", "how far around a hypothesis keyframes count", 0.1)
+    most_keyframes: int = parameter(16, "keyframes", "of them at most", 1, 1000)
+    least_matched: float = parameter(40.0, "points", "(cells of 0.1 m) on known surfaces")
+    least_explained: float = parameter(0.3, "share", "of the query on known surfaces")
+    most_conflict: float = parameter(0.15, "share", "that may contradict")
+    least_margin: float = parameter(0.15, "share", "of its evidence that the best one leads by")
+    least_information: float = parameter(
+        2.0e3, "1/m^2", "the least on the translation, as in recognition"
+    )
+    least_places: int = parameter(
+        3, "places", "in the component and its neighbours, to know what else looks alike"
+    )
+    least_score: float = parameter(0.9, "share", "how sure a unique answer must be")
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,9 +209,39 @@ class MapperConfig:
     thinning: ThinningConfig = field(default_factory=ThinningConfig)
     fusion: FusionConfig = field(default_factory=FusionConfig)
     persistence: PersistenceConfig = field(default_factory=PersistenceConfig)
-    checkpoint_every: int = 256
-    """Keyframes at least from one `Checkpoints` to the next."""
-    chapter: int = 256
-    """Keyframes in a chapter of the `History`."""
-    least_fit_late: float = 0.6
-    """Share of a late scan that must lie on its neighbours' surfaces."""
+    localise: LocaliseConfig = field(default_factory=LocaliseConfig)
+    checkpoint_every: int = parameter(
+        256, "keyframes", "at least from one checkpoint to the next", 1
+    )
+    chapter: int = parameter(256, "keyframes", "in a chapter of the history", 1, 1_000_000)
+    least_fit_late: float = parameter(0.6, "share", "of a late scan on its neighbours' surfaces")
+
+
+_ORDERED = (
+    ("tracker.memory", "tracker.noisy_memory"),
+    ("places.least_keyframes", "places.most_keyframes"),
+    ("recognition.cell", "recognition.half"),
+    ("doubt.place_right", "doubt.place_wrong"),
+    ("persistence.near", "persistence.far"),
+    ("localise.recognition.cell", "localise.recognition.half"),
+)
+"""The first of each pair is at most the second."""
+
+
+def config_from(given: Mapping[str, Any], base: MapperConfig | None = None) -> MapperConfig:
+    """Return `base` (the defaults) with the parameters that are given, nested by name.
+
+    Raises ParameterError, which names the first that is unknown or that cannot be so.
+    """
+    config = with_values(base or MapperConfig(), given)
+    for less, more in _ORDERED:
+        low, high = _get(config, less), _get(config, more)
+        if low > high:
+            raise ParameterError(less, f"is {low:g}, and {more} only {high:g}")
+    return config
+
+
+def _get(config: Any, name: str) -> float:
+    for part in name.split("."):
+        config = getattr(config, part)
+    return float(config)

@@ -35,14 +35,13 @@ from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.belief.verdicts import Verdicts
 from lineloom_core.mapping.changes import Changes
 from lineloom_core.mapping.config import MapperConfig
+from lineloom_core.mapping.digest import digest
 from lineloom_core.mapping.facts.front_end import take
 from lineloom_core.mapping.facts.history import History
 from lineloom_core.mapping.facts.keyframe import Keyframe
 from lineloom_core.mapping.facts.robot_record import RobotRecord
 from lineloom_core.mapping.snapshot import Snapshot, SnapshotError
 from lineloom_core.scan import Mount, Scan
-
-SNAPSHOT_FORMAT = 10
 
 
 class SiteMapper:
@@ -119,6 +118,10 @@ class SiteMapper:
         self._memory.forget(gone)
         self._rebuild(self._site.verdicts.without(gone).operators_only(), min(gone, default=None))
 
+    def note(self) -> None:
+        """Count a log entry that changes nothing: parameters hold from the first scan on."""
+        self._version += 1
+
     def retract(self, constraint: str) -> None:
         """Make the map as if the constraint had never been accepted, for good.
 
@@ -174,16 +177,16 @@ class SiteMapper:
         """The whole state, for `resume`, without the first `known` chapters of the history."""
         known_now = (self._site, self._robots, self._version)
         beliefs = dumps(known_now, self._memory, self._config)
-        state = (SNAPSHOT_FORMAT, self._config, self._history, self._memory, beliefs)
+        state = (digest(self._config), self._config, self._history, self._memory, beliefs)
         return Snapshot(pickle.dumps(state, protocol=5), known, self._history.chapters(known))
 
     @classmethod
     def resume(cls, snapshot: Snapshot) -> SiteMapper:
         """Go on from a whole snapshot. Raises SnapshotError where it cannot be read."""
         try:
-            form, config, history, memory, beliefs = pickle.loads(snapshot.state)
-            if form != SNAPSHOT_FORMAT:
-                raise SnapshotError(f"snapshot of format {form}, expected {SNAPSHOT_FORMAT}")
+            made, config, history, memory, beliefs = pickle.loads(snapshot.state)
+            if made != digest(config):
+                raise SnapshotError(f"made by {made}, which is not {digest(config)}")
             history.bind(snapshot.chapters if snapshot.first == 0 else ())
             site, robots, version = loads(beliefs, history, memory, config)
         except SnapshotError:

@@ -16,6 +16,7 @@ from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.graph.observability import observe
 from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
 from lineloom_core.matching.local_map import Registration
+from lineloom_core.parameters import parameter
 from lineloom_core.places import _kernels
 from lineloom_core.places.place import Place, count_points, count_steady
 from lineloom_core.timing import timed
@@ -23,34 +24,36 @@ from lineloom_core.timing import timed
 
 @dataclass(frozen=True, slots=True)
 class RecognitionConfig:
-    """Thresholds of the verdict; lengths in metres, shares 0..1.
+    """When two places are the same."""
 
-    half, cell: how far apart anchors may lie, and the cell of the translation vote.
-    most_conflict: share of judged points in the other's free space, beyond
-    what the places show against themselves. most_missing: share of what stood still in one place
-    that the other saw through. least_matched: points (cells
-    of 0.1 m) that both saw. least_overlap: common length of lines. least_fit: share of the
-    points inside both grids that lie on the other's surface. least_margin: by how much evidence
-    the best hypothesis beats the best rival, as a share. least_information: smallest eigenvalue
-    of the information on the translation [1/m^2], points scaled as `Registration` does.
-    """
-
-    half: float = 16.0
-    cell: float = 0.25
-    rotations: int = 8
-    cells: int = 12
-    pair_limit: int = 80
-    least_explained: float = 5.0
-    coarse_keep: int = 16
-    fine_keep: int = 4
-    most_conflict: float = 0.1
-    most_missing: float = 0.05
-    least_matched: float = 100.0
-    least_overlap: float = 5.0
-    least_margin: float = 0.15
-    least_information: float = 6.0e3
-    rival_distance: float = 0.5
-    rival_angle: float = 0.15
+    half: float = parameter(16.0, "m", "how far apart the places' anchors may lie", 0.1, 200.0)
+    cell: float = parameter(0.25, "m", "of the vote for translations", 0.02)
+    rotations: int = parameter(8, "hypotheses", "peaks of the histogram of rotations", 1, 1000)
+    cells: int = parameter(12, "hypotheses", "cells of the vote for each rotation", 1, 1000)
+    pair_limit: int = parameter(80, "pairs", "of lines that vote for each rotation", 1, 100_000)
+    least_explained: float = parameter(
+        5.0, "m", "of line that the best cell explains, else the places have nothing in common"
+    )
+    coarse_keep: int = parameter(
+        16, "hypotheses", "that see the coarse check in free space", 1, 10_000
+    )
+    fine_keep: int = parameter(4, "hypotheses", "that see the full one", 1, 10_000)
+    most_conflict: float = parameter(
+        0.1, "share", "of points in the other's free space, beyond what is in its own"
+    )
+    most_missing: float = parameter(
+        0.05, "share", "of what stood still in one place that the other saw through"
+    )
+    least_matched: float = parameter(100.0, "points", "(cells of 0.1 m) that both saw")
+    least_overlap: float = parameter(5.0, "m", "common length of lines")
+    least_margin: float = parameter(
+        0.15, "share", "of its evidence that the best hypothesis leads the best rival by"
+    )
+    least_information: float = parameter(
+        6.0e3, "1/m^2", "the least on the translation, points scaled as `Registration` does"
+    )
+    rival_distance: float = parameter(0.5, "m", "from which on a hypothesis is a rival")
+    rival_angle: float = parameter(0.15, "rad", "from which on a hypothesis is a rival")
 
 
 @dataclass(frozen=True, eq=False)

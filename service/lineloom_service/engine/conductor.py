@@ -11,8 +11,9 @@ import contextlib
 import logging
 from typing import Any
 
-import lineloom_core
 from lineloom_core.mapping.answers.site_view import SiteView
+from lineloom_core.mapping.config import MapperConfig
+from lineloom_core.mapping.digest import digest
 
 from lineloom_service.engine.forwarding import Forwarding
 from lineloom_service.engine.protocol import Engine, Recorder
@@ -227,7 +228,7 @@ class Conductor:
             self._store,
             self._engine,
             self._pace,
-            lineloom_core.__version__,
+            digest(MapperConfig()),
             self._recorder,
             new=new,
         )

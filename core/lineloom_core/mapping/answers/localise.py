@@ -25,11 +25,11 @@ from lineloom_core.mapping.answers.localisation import (
     LocalisationVerdict,
     PoseHypothesis,
 )
-from lineloom_core.mapping.answers.localise_config import LocaliseConfig
 from lineloom_core.mapping.answers.localise_score import probability
 from lineloom_core.mapping.answers.query_place import query_place
 from lineloom_core.mapping.answers.surroundings import surroundings
 from lineloom_core.mapping.belief.site_map import SiteMap
+from lineloom_core.mapping.config import LocaliseConfig
 from lineloom_core.mapping.facts.information import INDEPENDENT_SHARE, turned
 from lineloom_core.places import (
     Place,
@@ -57,7 +57,7 @@ def localise(
     site: SiteMap, scans: Sequence[Scan], config: LocaliseConfig | None = None
 ) -> Localisation:
     """Find where the latest of one robot's scans was taken; a pure function of its arguments."""
-    config = config or LocaliseConfig()
+    config = config or site.config.localise
     query = query_place(scans, site.config)
     if query is None:
         return Localisation("unknown", "no scan shows anything")

@@ -1,0 +1,118 @@
+"""Parameters as data: beside its default each has a unit, a meaning, and the values that can be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+Number = TypeVar("Number", int, float)
+
+_BOUNDS = {"share": (0.0, 1.0), "rad": (0.0, math.pi), "m": (0.0, 1000.0), "s": (0.0, 86_400.0)}
+
+
+class ParameterError(ValueError):
+    """A parameter that is unknown or cannot be so. name: its dotted name. reason: why not."""
+
+    def __init__(self, name: str, reason: str) -> None:
+        super().__init__(f"{name}: {reason}" if name else reason)
+        self.name = name
+        self.reason = reason
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One parameter. unit: "" for a plain number; "share" is 0 to 1. least, most: what it can be.
+
+    whole: it counts something.
+    """
+
+    value: float
+    default: float
+    unit: str
+    meaning: str
+    least: float
+    most: float
+    whole: bool
+
+    def checked(self, name: str, value: object) -> float:
+        """Return a value for it. Raises ParameterError."""
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise ParameterError(name, f"has to be a number, not {value!r}")
+        if not self.least <= value <= self.most:  # nor is NaN
+            allowed = f"from {self.least:g} to {self.most:g}"
+            raise ParameterError(
+                name, f"has to be {allowed} {self.unit}".rstrip() + f", not {value:g}"
+            )
+        if self.whole and value != int(value):
+            raise ParameterError(name, f"has to be a whole number, not {value:g}")
+        return int(value) if self.whole else float(value)
+
+
+def parameter(
+    default: Number, unit: str, meaning: str, least: float | None = None, most: float | None = None
+) -> Number:
+    """Return the field of a parameters' dataclass; bounds that are not given are the unit's."""
+    low, high = _BOUNDS.get(unit, (0.0, 1e9))
+    described = (unit, meaning, low if least is None else least, high if most is None else most)
+    made: Any = field(default=default, metadata={"parameter": described})
+    return made  # type: ignore[no-any-return]
+
+
+def effective(config: Any) -> dict[str, Any]:
+    """Return every parameter of a tree of dataclasses by name, nested as they are."""
+    return _described(config, type(config)())
+
+
+def _described(config: Any, default: Any) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for f in fields(config):
+        value, usual = getattr(config, f.name), getattr(default, f.name)
+        if is_dataclass(value):
+            found[f.name] = _described(value, usual)
+        else:
+            unit, meaning, least, most = f.metadata["parameter"]
+            whole = isinstance(usual, int)
+            found[f.name] = Parameter(value, usual, unit, meaning, least, most, whole)
+    return found
+
+
+def values(config: Any) -> dict[str, Any]:
+    """Return the values alone, nested; `with_values` makes the same config of them."""
+    return {
+        f.name: values(value) if is_dataclass(value := getattr(config, f.name)) else value
+        for f in fields(config)
+    }
+
+
+def with_values(config: T, changes: Mapping[str, Any]) -> T:
+    """Return the config with these values, nested, in place of its own. Raises ParameterError."""
+    changed: T = _changed(config, effective(config), changes, "")
+    return changed
+
+
+def _changed(config: Any, known: dict[str, Any], changes: Any, above: str) -> Any:
+    if not isinstance(changes, Mapping):
+        raise ParameterError(above, f"has to hold parameters by name, not {changes!r}")
+    new: dict[str, Any] = {}
+    for key, value in changes.items():
+        name = f"{above}.{key}" if above else str(key)
+        if key not in known:
+            raise ParameterError(name, "is not a parameter")
+        if isinstance(known[key], Parameter):
+            new[key] = known[key].checked(name, value)
+        else:
+            new[key] = _changed(getattr(config, key), known[key], value, name)
+    return replace(config, **new)
+
+
+def by_name(tree: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Go through a nested mapping's leaves with their dotted names."""
+    for key, value in tree.items():
+        name = f"{above}.{key}" if above else key
+        if isinstance(value, Mapping):
+            yield from by_name(value, name)
+        else:
+            yield name, value

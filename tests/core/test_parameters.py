@@ -1,0 +1,68 @@
+"""Every parameter says what it is, and none can be what it cannot be."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from lineloom_core.mapping.config import JoinConfig, MapperConfig, config_from
+from lineloom_core.parameters import ParameterError, by_name, effective, values
+
+PARAMETERS = dict(by_name(effective(MapperConfig())))
+
+
+def test_every_parameter_has_a_meaning_and_a_default_that_can_be() -> None:
+    assert len(PARAMETERS) > 120, "the search for parameters is broken"
+    assert [name for name, p in PARAMETERS.items() if not p.meaning] == []
+    assert [name for name, p in PARAMETERS.items() if not p.least <= p.default <= p.most] == []
+    assert [name for name, p in PARAMETERS.items() if p.whole != isinstance(p.value, int)] == []
+
+
+def test_what_differs_from_the_default_shows() -> None:
+    shown = dict(by_name(effective(MapperConfig(join=JoinConfig(least_set=5)))))
+    changed = {name: (p.value, p.default) for name, p in shown.items() if p.value != p.default}
+    assert changed == {"join.least_set": (5, 3)}
+
+
+def test_the_default_of_a_part_is_that_of_its_place() -> None:
+    assert PARAMETERS["recognition.least_explained"].default == 5.0
+    assert PARAMETERS["localise.recognition.least_explained"].default == 3.0
+
+
+def test_a_config_is_what_its_values_say() -> None:
+    config = MapperConfig(join=JoinConfig(least_set=5), chapter=8)
+    assert config_from(values(config)) == config
+    assert config_from({}) == MapperConfig()
+
+
+def test_what_is_not_given_is_the_base_s() -> None:
+    base = MapperConfig(chapter=8)
+    found = config_from({"join": {"least_evidence": 80}}, base)
+    assert (found.chapter, found.join.least_evidence) == (8, 80.0)
+    assert isinstance(found.join.least_evidence, float)
+
+
+@pytest.mark.parametrize(
+    ("given", "name", "reason"),
+    [
+        ({"join": {"least_sett": 3}}, "join.least_sett", "not a parameter"),
+        ({"joint": {}}, "joint", "not a parameter"),
+        ({"join": 3}, "join", "by name"),
+        ({"join": {"least_set": 0}}, "join.least_set", "from 1 to"),
+        ({"join": {"least_set": 2.5}}, "join.least_set", "whole number"),
+        ({"join": {"least_set": True}}, "join.least_set", "a number"),
+        ({"join": {"lead": math.nan}}, "join.lead", "from 0.001"),
+        ({"join": {"least_evidence": math.inf}}, "join.least_evidence", "to 1000 m"),
+        ({"tracker": {"least_fit": 1.5}}, "tracker.least_fit", "from 0 to 1"),
+        ({"chapter": "many"}, "chapter", "a number, not 'many'"),
+        ({"chapter": {"of": 3}}, "chapter", "a number"),
+        ({"localise": {"recognition": {"cell": 0}}}, "localise.recognition.cell", "from 0.02"),
+        ({"persistence": {"near": 0.5}}, "persistence.near", "persistence.far only 0.3"),
+    ],
+)
+def test_what_cannot_be_is_refused_by_name(given: dict[str, Any], name: str, reason: str) -> None:
+    with pytest.raises(ParameterError, match=reason) as refused:
+        config_from(given)
+    assert refused.value.name == name
+    assert name in str(refused.value)
