@@ -9,43 +9,20 @@ import sqlalchemy as sa
 from lineloom_service.store.migrate import downgrade, migrate
 from lineloom_service.store.records import NewScan, SnapshotRecord, StoreError
 from lineloom_service.store.sql_store import SqlStore
-from lineloom_service.store.sqlite_database import SqliteDatabase, sqlite_engine
+from lineloom_service.store.sqlite_database import SqliteDatabase
+from lineloom_service.store.sqlite_engine import sqlite_engine
 
-SCANS = [NewScan("0", seq, b"scan %d" % seq) for seq in (0, 1, 2, 4)]
+from tests.service.old_databases import SCANS, make_old_file
 
 
 def _store(path: Path) -> SqlStore:
     return SqlStore(SqliteDatabase(path / "lineloom.db"), gap_window_s=60.0, max_held=1000)
 
 
-def _old_database(path: Path) -> None:
-    """A file as the first version left it: two robots, a mount, a held scan."""
-    engine = sqlite_engine(path / "lineloom.db")
-    with engine.begin() as connection:
-        migrate(connection, "0001")
-        for statement in (
-            "INSERT INTO sites (id, name, position) VALUES (1, 'site', 4)",
-            "INSERT INTO robots (id, site_id, name, mount) VALUES (1, 1, 'r', x'6d')",
-            "INSERT INTO robots (id, site_id, name, forgotten) VALUES (2, 1, 'gone', 1)",
-            "INSERT INTO streams (id, robot_id, session, released, highest, accepted)"
-            " VALUES (1, 1, '0', 2, 4, 4)",
-            "INSERT INTO entries (id, site_id, robot_id, kind, body, position)"
-            " VALUES (1, 1, 1, 'mount', x'6d', 1)",
-        ):
-            connection.exec_driver_sql(statement)
-        for number, scan in enumerate(SCANS):
-            connection.exec_driver_sql(
-                "INSERT INTO entries (id, site_id, robot_id, kind, stream_id, seq, body, position)"
-                " VALUES (?, 1, 1, 'scan', 1, ?, ?, ?)",
-                (number + 2, scan.seq, scan.body, None if scan.seq == 4 else number + 2),
-            )
-    engine.dispose()
-
-
 async def test_a_database_of_the_first_version_is_upgraded_with_all_it_holds(
     tmp_path: Path,
 ) -> None:
-    _old_database(tmp_path)
+    make_old_file(tmp_path / "lineloom.db", "0001")
     store = _store(tmp_path)
     await store.open()
     record = await store.site("site")
@@ -69,12 +46,7 @@ async def test_a_database_of_the_first_version_is_upgraded_with_all_it_holds(
 async def test_a_snapshot_from_before_there_were_chapters_goes_on_from_none(
     tmp_path: Path,
 ) -> None:
-    _old_database(tmp_path)
-    engine = sqlite_engine(tmp_path / "lineloom.db")
-    with engine.begin() as connection:
-        migrate(connection, "0007")
-        connection.exec_driver_sql("INSERT INTO snapshots VALUES (1, 4, 3, 'v1', x'6f6c64')")
-    engine.dispose()
+    make_old_file(tmp_path / "lineloom.db", "0007")
     store = _store(tmp_path)
     await store.open()
     snapshot = await store.latest_snapshot(1, "v1")
@@ -86,7 +58,7 @@ async def test_a_snapshot_from_before_there_were_chapters_goes_on_from_none(
 async def test_going_back_a_version_leaves_no_snapshot_without_its_chapters(
     tmp_path: Path,
 ) -> None:
-    _old_database(tmp_path)
+    make_old_file(tmp_path / "lineloom.db", "0001")
     store = _store(tmp_path)
     await store.open()
     await store.save_snapshot(1, SnapshotRecord(2, 1, "v1", b"whole"))
@@ -102,7 +74,7 @@ async def test_going_back_a_version_leaves_no_snapshot_without_its_chapters(
 
 
 async def test_the_upgrade_leaves_a_copy_of_the_database_as_it_was(tmp_path: Path) -> None:
-    _old_database(tmp_path)
+    make_old_file(tmp_path / "lineloom.db", "0001")
     for _ in range(2):  # the second start finds nothing to upgrade
         store = _store(tmp_path)
         await store.open()
@@ -119,7 +91,7 @@ async def test_the_upgrade_leaves_a_copy_of_the_database_as_it_was(tmp_path: Pat
 
 async def test_no_copy_takes_the_place_of_another(tmp_path: Path) -> None:
     (tmp_path / "lineloom.db.backup-0001").write_text("of long ago")
-    _old_database(tmp_path)
+    make_old_file(tmp_path / "lineloom.db", "0001")
     store = _store(tmp_path)
     await store.open()
     await store.close()

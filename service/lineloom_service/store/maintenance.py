@@ -12,7 +12,7 @@ from lineloom_service.store.choice import database_at
 from lineloom_service.store.database import Work
 from lineloom_service.store.directory_lock import DirectoryLock
 from lineloom_service.store.records import StoreError
-from lineloom_service.store.sqlite_database import sqlite_engine
+from lineloom_service.store.sqlite_engine import sqlite_engine
 
 T = TypeVar("T")
 

@@ -15,7 +15,10 @@ from lineloom_service.store.records import StoreError
 
 
 def migrate(connection: Connection, revision: str = "head") -> None:
-    """Create or upgrade the tables. Raises StoreError where a newer version wrote the database."""
+    """Create or upgrade the tables, in the caller's transaction.
+
+    Raises StoreError where a newer version wrote the database.
+    """
     config = _config(connection)
     try:
         command.upgrade(config, revision)
@@ -27,20 +30,24 @@ def migrate(connection: Connection, revision: str = "head") -> None:
         ) from error
 
 
-def outdated(connection: Connection) -> str | None:
-    """Return the revision of a database that `migrate` would upgrade; None where it is new."""
-    script = ScriptDirectory.from_config(_config(connection))
-    current = MigrationContext.configure(connection).get_current_revision()
+def current_revision(connection: Connection) -> str | None:
+    """Return the revision of a database; None where it is new, or its making was not finished."""
+    return MigrationContext.configure(connection).get_current_revision()
+
+
+def is_outdated(revision: str | None) -> bool:
+    """Whether `migrate` would change a database of this revision."""
+    script = ScriptDirectory.from_config(_config())
     known = {step.revision for step in script.walk_revisions()}
-    return current if current in known - {script.get_current_head()} else None
+    return revision is None or revision in known - {script.get_current_head()}
 
 
 def downgrade(connection: Connection, revision: str) -> None:
-    """Go back to an older revision; what it has no place for is lost."""
+    """Go back to an older revision, in the caller's transaction; what it has no room for goes."""
     command.downgrade(_config(connection), revision)
 
 
-def _config(connection: Connection) -> Config:
+def _config(connection: Connection | None = None) -> Config:
     config = Config()
     config.set_main_option("script_location", str(Path(__file__).parent / "migrations"))
     config.attributes["connection"] = connection

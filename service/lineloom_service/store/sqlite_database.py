@@ -1,33 +1,21 @@
-"""The SQLite file: how it is opened and upgraded, and on which threads its work runs."""
+"""The SQLite file, and on which threads work on it runs."""
 
 from __future__ import annotations
 
 import asyncio
-import logging
-import os
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
-from sqlalchemy import Engine, create_engine, event
-from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy import Engine
 
 from lineloom_service.store.database import Claim, NoticeListener, Work
 from lineloom_service.store.directory_lock import DirectoryLock
-from lineloom_service.store.migrate import migrate, outdated
 from lineloom_service.store.records import StoreError
+from lineloom_service.store.sqlite_engine import reading, sqlite_engine
+from lineloom_service.store.sqlite_upgrade import upgrade_file
 
 T = TypeVar("T")
-
-_LOG = logging.getLogger(__name__)
-
-_PRAGMAS = (
-    "PRAGMA journal_mode = WAL",
-    # A commit returns when it is on the disk, not when it is on its way.
-    "PRAGMA synchronous = FULL",
-    "PRAGMA foreign_keys = ON",
-    "PRAGMA busy_timeout = 5000",
-)
 
 
 class SqliteDatabase:
@@ -50,8 +38,8 @@ class SqliteDatabase:
         """Lock the directory and upgrade the file."""
         self._lock.acquire()
         try:
+            await asyncio.to_thread(upgrade_file, self._path)
             self._engine = sqlite_engine(self._path)
-            await asyncio.to_thread(_upgrade, self._engine, self._path)
         except BaseException:
             self._lock.release()
             raise
@@ -69,7 +57,7 @@ class SqliteDatabase:
 
     async def read(self, work: Work[T]) -> T:
         """Run work on a reader's thread."""
-        engine = self._opened()
+        engine = reading(self._opened())
 
         def run() -> T:
             with engine.connect() as connection:
@@ -98,50 +86,3 @@ class SqliteDatabase:
         if self._engine is None or self._writer is None:
             raise StoreError("the storage is not open")
         return self._engine
-
-
-def sqlite_engine(path: Path) -> Engine:
-    """Return an engine whose every connection is durable and tolerant of a concurrent reader."""
-    engine = create_engine(
-        f"sqlite:///{path}", connect_args={"check_same_thread": False}, pool_size=4
-    )
-    event.listen(engine, "connect", _prepare)
-    return engine
-
-
-def _prepare(connection: Any, _record: Any) -> None:
-    cursor = connection.cursor()
-    for pragma in _PRAGMAS:
-        cursor.execute(pragma)
-    cursor.close()
-
-
-def _upgrade(engine: Engine, path: Path) -> None:
-    try:
-        with engine.connect() as connection:
-            revision = outdated(connection)
-        if revision is not None:
-            _back_up(engine, path, revision)
-        with engine.begin() as connection:
-            migrate(connection)
-    except (SQLAlchemyError, OSError) as error:
-        raise StoreError(f"cannot use the database {path}: {error}") from error
-
-
-def _back_up(engine: Engine, path: Path, revision: str) -> None:
-    """Write a copy of the file as it was before the upgrade, under a name not used before."""
-    names = [f"{path.name}.backup-{revision}"]
-    while (copy := path.with_name(names[-1])).exists():
-        names.append(f"{names[0]}.{len(names) + 1}")
-    # Under another name until it is whole: what bears the name of a backup is one.
-    unfinished = copy.with_name(f"{copy.name}.unfinished")
-    unfinished.unlink(missing_ok=True)
-    with engine.connect() as connection:
-        connection.exec_driver_sql("VACUUM INTO ?", (str(unfinished),))
-    descriptor = os.open(unfinished, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-    unfinished.rename(copy)
-    _LOG.warning("the database is of revision %s; it is upgraded, a copy is %s", revision, copy)
