@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba.core.event import install_recorder
 
 from lineloom_core.fusion.occupancy import rasterise
+from lineloom_core.kernels.compilations import compilations
 from lineloom_core.mapping.site_mapper import SiteMapper
 from lineloom_core.matching import LineMatcher
 from lineloom_core.scan import Scan
@@ -19,9 +19,9 @@ def warm_up() -> bool:
     Returns whether anything had to be compiled: the compiler keeps some 300 MB for as long as its
     process runs, and another one, that finds all in the cache, does without.
     """
-    with install_recorder("numba:compile") as compiled:
+    with compilations() as compiled:
         _drive()
-    return bool(compiled.buffer)
+    return bool(compiled)
 
 
 def _drive() -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from lineloom_core.features._kernels import (
     FIRST,
@@ -23,6 +22,7 @@ from lineloom_core.features._kernels import (
     fit_run,
     prefix_moments,
 )
+from lineloom_core.kernels import kernel
 
 CX, CY, RADIUS, VAR_XX, VAR_XY, VAR_YY, VAR_RADIUS, SENSE, ARC, POINTS, BEGIN, END = range(12)
 CIRCLE_COLUMNS = 12
@@ -45,7 +45,7 @@ LEAST_LIKELIHOOD = 6.0
 """How much likelier (logarithm) a circle must make the points than two lines do."""
 
 
-@njit(cache=True)
+@kernel
 def invert3(A, out):  # type: ignore[no-untyped-def]
     """out = A^-1 of a symmetric 3x3 matrix; False where it is singular."""
     c00 = A[1, 1] * A[2, 2] - A[1, 2] * A[1, 2]
@@ -62,7 +62,7 @@ def invert3(A, out):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(cache=True)
+@kernel
 def algebraic_circle(xy, index, n):  # type: ignore[no-untyped-def]
     """Centre and radius that minimise sum (d^2 - r^2)^2 over points index[:n]; r = 0 if straight.
 
@@ -95,7 +95,7 @@ def algebraic_circle(xy, index, n):  # type: ignore[no-untyped-def]
     return mx + a, my + b, math.sqrt(square), max(least, 0.0) / (4.0 * square)
 
 
-@njit(cache=True)
+@kernel
 def geometric_circle(xy, index, n, most, circle, A, C):  # type: ignore[no-untyped-def]
     """Gauss-Newton on the distances to the circle from the algebraic fit; fills circle (3,), C.
 
@@ -139,7 +139,7 @@ def geometric_circle(xy, index, n, most, circle, A, C):  # type: ignore[no-untyp
     return squares
 
 
-@njit(cache=True)
+@kernel
 def arc_extent(xy, index, n, circle):  # type: ignore[no-untyped-def]
     """Angles [rad] about the centre: what the points span, and what of it they cover closely.
 
@@ -159,7 +159,7 @@ def arc_extent(xy, index, n, circle):  # type: ignore[no-untyped-def]
     return 2.0 * math.pi - widest, cover
 
 
-@njit(cache=True)
+@kernel
 def two_line_squares(xy, index, n):  # type: ignore[no-untyped-def]
     """Least sum of squared distances to two lines, the points split in order: a corner."""
     ordered = np.empty((n, 2))
@@ -173,7 +173,7 @@ def two_line_squares(xy, index, n):  # type: ignore[no-untyped-def]
     return best
 
 
-@njit(cache=True)
+@kernel
 def sense_of(xy, index, n, circle):  # type: ignore[no-untyped-def]
     """COLUMN where nearly all points show their outside to the sensor, ROOM: inside; else 0."""
     outside = 0
@@ -186,7 +186,7 @@ def sense_of(xy, index, n, circle):  # type: ignore[no-untyped-def]
     return ROOM if outside <= 0.1 * n else 0.0
 
 
-@njit(cache=True)
+@kernel
 def measured_covariance(xy, index, n, sigma, circle, squares, C):  # type: ignore[no-untyped-def]
     """Turn C = (J'J)^-1 into the covariance of centre and radius: C (J'SJ) C.
 
@@ -216,7 +216,7 @@ def measured_covariance(xy, index, n, sigma, circle, squares, C):  # type: ignor
     C[:] = var * (C @ B @ C)
 
 
-@njit(cache=True)
+@kernel
 def judge_circle(xy, index, n, sigma, circle, squares, C, row, strict):  # type: ignore[no-untyped-def]
     """Fill `row` if the points are a circle's: round enough, long enough, and no corner.
 
@@ -254,7 +254,7 @@ def judge_circle(xy, index, n, sigma, circle, squares, C, row, strict):  # type:
     return True
 
 
-@njit(cache=True)
+@kernel
 def try_circle(xy, index, n, sigma, circle, A, C, row, strict):  # type: ignore[no-untyped-def]
     """Fit and judge: False where points index[:n] are no circle's, else `circle` and `row` are."""
     most = 3.0 * n * (MOST_SPREAD * sigma) ** 2
@@ -262,7 +262,7 @@ def try_circle(xy, index, n, sigma, circle, A, C, row, strict):  # type: ignore[
     return squares >= 0.0 and judge_circle(xy, index, n, sigma, circle, squares, C, row, strict)
 
 
-@njit(cache=True)
+@kernel
 def adopt_points(xy, circle, sense, sigma, index):  # type: ignore[no-untyped-def]
     """All points of the scan that lie on a circle, what hides parts of it left out; their count."""
     count = 0
@@ -275,7 +275,7 @@ def adopt_points(xy, circle, sense, sigma, index):  # type: ignore[no-untyped-de
     return count
 
 
-@njit(cache=True)
+@kernel
 def bent_runs(lines, place, turns):  # type: ignore[no-untyped-def]
     """Fill `turns` with (first, last) point of runs of chords that turn one way; their count.
 
@@ -305,7 +305,7 @@ def bent_runs(lines, place, turns):  # type: ignore[no-untyped-def]
     return count
 
 
-@njit(cache=True)
+@kernel
 def round_clusters(xy, breaks, min_points, spans):  # type: ignore[no-untyped-def]
     """Fill `spans` with (first, last) of small surfaces bent like an arc; their count.
 
@@ -330,7 +330,7 @@ def round_clusters(xy, breaks, min_points, spans):  # type: ignore[no-untyped-de
     return count
 
 
-@njit(cache=True)
+@kernel
 def find_circles(xy, beam, breaks, lines, beams, sigma, min_points):  # type: ignore[no-untyped-def]
     """Circles of one scan, rows of CIRCLE_COLUMNS: small round surfaces, then runs of chords.
 
@@ -379,7 +379,7 @@ def find_circles(xy, beam, breaks, lines, beams, sigma, min_points):  # type: ig
     return out[:kept]
 
 
-@njit(cache=True)
+@kernel
 def chords(lines, circles, reach):  # type: ignore[no-untyped-def]
     """(n,) True for lines that are pieces of a circle's surface: both ends and the middle on it."""
     out = np.zeros(lines.shape[0], dtype=np.bool_)

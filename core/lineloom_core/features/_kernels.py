@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from lineloom_core.kernels import kernel
 
 X1, Y1, X2, Y2, THETA, OFFSET, LENGTH, VAR_THETA, VAR_OFFSET, COUNT, FIRST, LAST = range(12)
 LINE_COLUMNS = 12
@@ -16,7 +17,7 @@ INTERIOR, EDGE, UNKNOWN = 0, 1, 2
 OPEN_CHAINS = 4
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def to_points(ranges, angle_min, angle_increment):  # type: ignore[no-untyped-def]
     """Finite returns as (n, 2) points and their beam indices (§3.1.3)."""
     n = ranges.shape[0]
@@ -41,7 +42,7 @@ def to_points(ranges, angle_min, angle_increment):  # type: ignore[no-untyped-de
     return xy[:m], beam[:m]
 
 
-@njit(cache=True)
+@kernel
 def cluster_points(xy, beam, ranges, angle_increment, lam, sigma, max_gap_beams):  # type: ignore[no-untyped-def]
     """Chain points into surfaces by adaptive break points; return their order and chain ends.
 
@@ -88,7 +89,7 @@ def cluster_points(xy, beam, ranges, angle_increment, lam, sigma, max_gap_beams)
     return order, breaks
 
 
-@njit(cache=True)
+@kernel
 def farthest_from_chord(xy, a, b):  # type: ignore[no-untyped-def]
     """Index and distance of the point of a..b farthest from the chord a-b (iterative end point)."""
     ux, uy = xy[b, 0] - xy[a, 0], xy[b, 1] - xy[a, 1]
@@ -102,7 +103,7 @@ def farthest_from_chord(xy, a, b):  # type: ignore[no-untyped-def]
     return where, best
 
 
-@njit(cache=True)
+@kernel
 def split_clusters(xy, breaks, threshold, runs):  # type: ignore[no-untyped-def]
     """Algorithm 1, the split: fill `runs` (first, last, cluster) in order; return their count."""
     n = xy.shape[0]
@@ -135,7 +136,7 @@ def split_clusters(xy, breaks, threshold, runs):  # type: ignore[no-untyped-def]
     return count
 
 
-@njit(cache=True)
+@kernel
 def prefix_moments(xy):  # type: ignore[no-untyped-def]
     """Running sums of x, y, xx, xy, yy: the moments of any run of points in constant time."""
     n = xy.shape[0]
@@ -150,7 +151,7 @@ def prefix_moments(xy):  # type: ignore[no-untyped-def]
     return s
 
 
-@njit(cache=True)
+@kernel
 def fit_run(xy, s, a, b):  # type: ignore[no-untyped-def]
     """Total least squares over points a..b: centroid, direction a -> b, spread across, along."""
     m = b - a + 1
@@ -167,7 +168,7 @@ def fit_run(xy, s, a, b):  # type: ignore[no-untyped-def]
     return mx, my, ux, uy, across, along
 
 
-@njit(cache=True)
+@kernel
 def max_deviation(xy, a, b, mx, my, ux, uy):  # type: ignore[no-untyped-def]
     """Largest distance of points a..b from the line through (mx, my) along (ux, uy)."""
     worst = 0.0
@@ -177,7 +178,7 @@ def max_deviation(xy, a, b, mx, my, ux, uy):  # type: ignore[no-untyped-def]
     return worst
 
 
-@njit(cache=True)
+@kernel
 def merge_runs(xy, s, runs, count, limit, min_points, max_gap):  # type: ignore[no-untyped-def]
     """Algorithm 1, the merge: join neighbours that lie on one line and leave no gap between."""
     if count == 0:
@@ -202,7 +203,7 @@ def merge_runs(xy, s, runs, count, limit, min_points, max_gap):  # type: ignore[
     return out + 1
 
 
-@njit(cache=True)
+@kernel
 def fit_lines(xy, s, beam, runs, count, sigma, min_points, min_length):  # type: ignore[no-untyped-def]
     """Rows of LINE_COLUMNS for the runs that are long and full enough; oriented, free side left."""
     lines = np.empty((count, LINE_COLUMNS))
@@ -241,7 +242,7 @@ def fit_lines(xy, s, beam, runs, count, sigma, min_points, min_length):  # type:
     return lines[:m]
 
 
-@njit(cache=True)
+@kernel
 def line_range_at(line, angle):  # type: ignore[no-untyped-def]
     """Range at which a beam at `angle` meets the infinite line; inf where it does not."""
     # n . (r c, r s) = offset with n the left normal.
@@ -252,7 +253,7 @@ def line_range_at(line, angle):  # type: ignore[no-untyped-def]
     return r if r > 0.0 else np.inf
 
 
-@njit(cache=True)
+@kernel
 def intersect(p, q):  # type: ignore[no-untyped-def]
     """Intersection of two infinite lines and the sine between them (0 where parallel)."""
     sp, cp = math.sin(p[THETA]), math.cos(p[THETA])
@@ -266,7 +267,7 @@ def intersect(p, q):  # type: ignore[no-untyped-def]
     return x, y, sine
 
 
-@njit(cache=True)
+@kernel
 def classify_ends(lines, ranges, angle_min, angle_increment, sigma, full_turn, corner_reach):  # type: ignore[no-untyped-def]
     """End types (n, 2) and edge points (n, 2, 2), §3.2-3.3: angle edges and jump edges.
 
@@ -323,7 +324,7 @@ def classify_ends(lines, ranges, angle_min, angle_increment, sigma, full_turn, c
     return ends, points
 
 
-@njit(cache=True)
+@kernel
 def extract(  # type: ignore[no-untyped-def]
     ranges,
     angle_min,
@@ -354,7 +355,7 @@ def extract(  # type: ignore[no-untyped-def]
     return xy, beam, breaks, lines, ends, edges
 
 
-@njit(cache=True)
+@kernel
 def point_normals(xy, breaks, reach):  # type: ignore[no-untyped-def]
     """Unit normals towards the sensor from up to `reach` chain neighbours a side; zeros where none.
 

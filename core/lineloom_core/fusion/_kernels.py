@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from lineloom_core.kernels import kernel
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -20,7 +21,7 @@ _SPACING_M = 0.5  # of the samples along a segment, when entered and when looked
 _DRIFT_M = 0.1  # either end of a line may have moved this far since it was entered
 
 
-@njit(cache=True)
+@kernel
 def merge_pass(
     pieces: Array,
     order: Indices,
@@ -110,20 +111,20 @@ def merge_pass(
     return labels, lines[:count].copy()
 
 
-@njit(cache=True)
+@kernel
 def _bucket(ix: int, iy: int, buckets: int) -> int:
     """Return the hash bucket of a cell; two cells in one bucket only cost time."""
     return ((ix * 73856093) ^ (iy * 19349663)) & (buckets - 1)
 
 
-@njit(cache=True)
+@kernel
 def _grown(array: Indices, least: int) -> Indices:
     bigger = np.empty(max(2 * array.shape[0], least), np.int64)
     bigger[: array.shape[0]] = array
     return bigger
 
 
-@njit(cache=True)
+@kernel
 def _fit_cost(
     line: Array, p: Array, cos_max_angle: float, max_offset: float, max_gap: float
 ) -> float:
@@ -154,7 +155,7 @@ def _fit_cost(
     return cost
 
 
-@njit(cache=True)
+@kernel
 def _merged(line: Array, p: Array, out: Array) -> None:
     """Sum the moments of both (Chan et al. 1979) and put the end points on the new line."""
     w = line[W] + p[W]
@@ -181,7 +182,7 @@ def _merged(line: Array, p: Array, out: Array) -> None:
     out[X2], out[Y2] = out[CX] + high * ux, out[CY] + high * uy
 
 
-@njit(cache=True)
+@kernel
 def _direction(moments: Array, toward_x: float, toward_y: float) -> tuple[float, float]:
     """Return the unit vector of the total least squares line, turned toward a given direction."""
     theta = 0.5 * math.atan2(2.0 * moments[SXY], moments[SXX] - moments[SYY])
@@ -191,7 +192,7 @@ def _direction(moments: Array, toward_x: float, toward_y: float) -> tuple[float,
     return ux, uy
 
 
-@njit(cache=True)
+@kernel
 def _spread(moments: Array) -> float:
     """Return the rms distance of the mass from its line [m]."""
     half_sum = 0.5 * (moments[SXX] + moments[SYY])
@@ -200,7 +201,7 @@ def _spread(moments: Array) -> float:
     return math.sqrt(max(least, 0.0) / moments[W])
 
 
-@njit(cache=True)
+@kernel
 def extents(endpoints: Array, labels: Indices, lines: Array) -> Array:
     """Return per line the two lowest starts, the two highest ends of its observations: (m, 4).
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from lineloom_core.kernels import kernel
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.uint16]
@@ -14,7 +15,7 @@ Counts = NDArray[np.uint16]
 _MOST = 65_000  # where a cell's count stops
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def walk(counts: Counts, ax: float, ay: float, bx: float, by: float) -> None:
     """Count every cell that the segment a to b, in units of cells, passes through.
 
@@ -41,7 +42,7 @@ def walk(counts: Counts, ax: float, ay: float, bx: float, by: float) -> None:
             next_y += wide_y
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def cast(
     poses: Array,
     sweeps: Array,

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from lineloom_core.kernels import kernel
 from lineloom_core.matching._free_space_kernels import beam_of
 
 SEEN, THROUGH, NOTHING = 1, -1, 0
@@ -19,7 +19,7 @@ LEAST_SINE = 0.2
 CLOSEST_M = 0.15
 
 
-@njit(cache=True)
+@kernel
 def look(px, py, ux, uy, pose, c, s, ranges, angle_min, increment, reach, near, far):  # type: ignore[no-untyped-def]
     """What one sweep says of a point on a line of direction (ux, uy), free side on the left."""
     dx, dy = px - pose[0], py - pose[1]
@@ -45,7 +45,7 @@ def look(px, py, ux, uy, pose, c, s, ranges, angle_min, increment, reach, near, 
     return THROUGH
 
 
-@njit(cache=True)
+@kernel
 def balances(  # type: ignore[no-untyped-def]
     lines, first_piece, poses, sweeps, starts, ranges, reach, near, far, most_sweeps, most_looks,
     most, loss, out,

@@ -10,10 +10,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from lineloom_core.kernels import kernel
 
 
-@njit(cache=True)
+@kernel
 def grown(a, need):  # type: ignore[no-untyped-def]
     """The array, or twice as long a copy where it is shorter than `need`."""
     if need <= a.shape[0]:
@@ -23,7 +24,7 @@ def grown(a, need):  # type: ignore[no-untyped-def]
     return longer
 
 
-@njit(cache=True)
+@kernel
 def neighbour_lists(count, ends):  # type: ignore[no-untyped-def]
     """Every node's neighbours, each once: pool, and where each list begins, its size and room."""
     room = np.zeros(count, np.int64)
@@ -55,7 +56,7 @@ def neighbour_lists(count, ends):  # type: ignore[no-untyped-def]
     return pool, begin, size, room, total
 
 
-@njit(cache=True)
+@kernel
 def move_bucket(head, after, before, v, old, new):  # type: ignore[no-untyped-def]
     """Move a node between the lists of nodes of one degree; -1: from or to none."""
     if old >= 0:
@@ -73,7 +74,7 @@ def move_bucket(head, after, before, v, old, new):  # type: ignore[no-untyped-de
         head[new] = v
 
 
-@njit(cache=True)
+@kernel
 def minimum_degree(count, ends):  # type: ignore[no-untyped-def]
     """Symbolic elimination of a graph without loops: order, starts, rows.
 
@@ -133,7 +134,7 @@ def minimum_degree(count, ends):  # type: ignore[no-untyped-def]
     return order, starts, numbered(order, starts, out)
 
 
-@njit(cache=True)
+@kernel
 def numbered(order, starts, nodes):  # type: ignore[no-untyped-def]
     """The columns' nodes as row numbers, ascending within each column."""
     count = order.shape[0]
@@ -152,7 +153,7 @@ def numbered(order, starts, nodes):  # type: ignore[no-untyped-def]
     return rows
 
 
-@njit(cache=True)
+@kernel
 def slots_of(ends, starts, rows):  # type: ignore[no-untyped-def]
     """Where each pair of columns has its block in `below`; -1 where a column is none (-1)."""
     slots = np.full(ends.shape[0], -1, np.int64)
@@ -166,7 +167,7 @@ def slots_of(ends, starts, rows):  # type: ignore[no-untyped-def]
     return slots
 
 
-@njit(cache=True)
+@kernel
 def root3(d, least):  # type: ignore[no-untyped-def]
     """Cholesky of a 3x3 block in place; false where a pivot is not above its `least`."""
     for r in range(3):
@@ -181,7 +182,7 @@ def root3(d, least):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(cache=True)
+@kernel
 def factorise(diagonal, below, starts, rows, least):  # type: ignore[no-untyped-def]
     """Turn the lower half of a symmetric matrix into its Cholesky factor in place.
 
@@ -211,7 +212,7 @@ def factorise(diagonal, below, starts, rows, least):  # type: ignore[no-untyped-
     return -1
 
 
-@njit(cache=True)
+@kernel
 def subtract_product(C, A, B):  # type: ignore[no-untyped-def]
     """C -= A B of 3x3 blocks, any of which may be a transposed view."""
     b00, b01, b02 = B[0, 0], B[0, 1], B[0, 2]
@@ -224,7 +225,7 @@ def subtract_product(C, A, B):  # type: ignore[no-untyped-def]
         C[r, 2] -= a0 * b02 + a1 * b12 + a2 * b22
 
 
-@njit(cache=True)
+@kernel
 def substitute(diagonal, below, starts, rows, x, begin):  # type: ignore[no-untyped-def]
     """Solve in place, x (n, 3): right sides by columns; nothing but zeros before `begin`."""
     count = diagonal.shape[0]
@@ -252,7 +253,7 @@ def substitute(diagonal, below, starts, rows, x, begin):  # type: ignore[no-unty
         x[j, 0] = (x0 - d[1, 0] * x[j, 1] - d[2, 0] * x[j, 2]) / d[0, 0]
 
 
-@njit(cache=True)
+@kernel
 def divide_right(S, d):  # type: ignore[no-untyped-def]
     """S <- S d^-1 with the lower triangular d."""
     for r in range(3):
@@ -261,7 +262,7 @@ def divide_right(S, d):  # type: ignore[no-untyped-def]
         S[r, 0] = (S[r, 0] - S[r, 1] * d[1, 0] - S[r, 2] * d[2, 0]) / d[0, 0]
 
 
-@njit(cache=True)
+@kernel
 def diagonal_of_inverse(diagonal, below, starts, rows):  # type: ignore[no-untyped-def]
     """Diagonal blocks of the inverse, (n, 3, 3), from the factor.
 
@@ -293,7 +294,7 @@ def diagonal_of_inverse(diagonal, below, starts, rows):  # type: ignore[no-untyp
     return out
 
 
-@njit(cache=True)
+@kernel
 def invert_turned(d, out):  # type: ignore[no-untyped-def]
     """out = d^-T, upper triangular, of the lower triangular d."""
     out[:] = 0.0

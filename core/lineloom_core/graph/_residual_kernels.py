@@ -8,19 +8,20 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from lineloom_core.kernels import kernel
 
 _SMALL_RAD = 1e-4  # half an angle below which the series is exact to double precision
 
 
-@njit(cache=True)
+@kernel
 def wrapped(angle):  # type: ignore[no-untyped-def]
     """The angle in (-pi, pi] [rad]."""
     turns = math.floor((math.pi - angle) / (2.0 * math.pi))
     return angle + 2.0 * math.pi * turns
 
 
-@njit(cache=True)
+@kernel
 def edge_error(pose_a, pose_b, measured, e, J_a, J_b):  # type: ignore[no-untyped-def]
     """e = Log(measured^-1 T_a_b) and its exact derivatives by right perturbations of both poses.
 
@@ -54,7 +55,7 @@ def edge_error(pose_a, pose_b, measured, e, J_a, J_b):  # type: ignore[no-untype
         J_a[r, 2] = -(J_b[r, 0] * back_y - J_b[r, 1] * back_x + J_b[r, 2])
 
 
-@njit(cache=True)
+@kernel
 def linearise(  # type: ignore[no-untyped-def]
     poses, ends, measured, information, weights, cauchy,
     columns, slots, gradient, diagonal, below, whole,
@@ -102,7 +103,7 @@ def linearise(  # type: ignore[no-untyped-def]
     return cost
 
 
-@njit(cache=True)
+@kernel
 def add_gradient(gradient, column, J, We, weight):  # type: ignore[no-untyped-def]
     """gradient[column] += weight J' We, unless the pose is held."""
     if column >= 0:
@@ -110,7 +111,7 @@ def add_gradient(gradient, column, J, We, weight):  # type: ignore[no-untyped-de
             gradient[column, r] += weight * (J[0, r] * We[0] + J[1, r] * We[1] + J[2, r] * We[2])
 
 
-@njit(cache=True)
+@kernel
 def multiply(W, J, weight, out):  # type: ignore[no-untyped-def]
     """out = weight W J."""
     for r in range(3):
@@ -118,7 +119,7 @@ def multiply(W, J, weight, out):  # type: ignore[no-untyped-def]
             out[r, c] = weight * (W[r, 0] * J[0, c] + W[r, 1] * J[1, c] + W[r, 2] * J[2, c])
 
 
-@njit(cache=True)
+@kernel
 def add_turned_product(C, A, B):  # type: ignore[no-untyped-def]
     """C += A' B."""
     for r in range(3):
@@ -126,7 +127,7 @@ def add_turned_product(C, A, B):  # type: ignore[no-untyped-def]
             C[r, c] += A[0, r] * B[0, c] + A[1, r] * B[1, c] + A[2, r] * B[2, c]
 
 
-@njit(cache=True)
+@kernel
 def move(poses, held, columns_of, steps):  # type: ignore[no-untyped-def]
     """poses <- poses Exp(steps) by the chart (x, y, theta), in place; returns the longest step."""
     longest = 0.0

@@ -11,12 +11,9 @@ import json
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
-
-import llvmlite.binding
-import numba
 
 import lineloom_core
+from lineloom_core.kernels.target import target_name
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.parameters import values
 
@@ -35,7 +32,7 @@ def digest(config: MapperConfig) -> str:
 @cache
 def making() -> str:
     """Return the part that is the same for all parameters."""
-    target = [*(f"{name} {version(name)}" for name in _LIBRARIES), *_kernel_target()]
+    target = [*(f"{name} {version(name)}" for name in _LIBRARIES), target_name()]
     return _short("\n".join((code_digest(Path(lineloom_core.__file__).parent), *target)).encode())
 
 
@@ -49,14 +46,6 @@ def code_digest(package: Path) -> str:
     if not names:
         raise RuntimeError(f"{package} has no source files, so maps cannot be told apart")
     return found.hexdigest()
-
-
-def _kernel_target() -> tuple[str, str]:
-    """Return name and features of the processor that kernels are compiled for."""
-    configured: Any = numba.config  # its names come at run time
-    features = llvmlite.binding.get_host_cpu_features().flatten()
-    name = llvmlite.binding.get_host_cpu_name()
-    return configured.CPU_NAME or name, configured.CPU_FEATURES or features
 
 
 def _short(data: bytes) -> str:

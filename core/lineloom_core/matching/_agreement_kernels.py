@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from lineloom_core.features._kernels import THETA
+from lineloom_core.kernels import kernel
 from lineloom_core.matching._circle_match_kernels import arc_length, centre_residual, same_circle
 from lineloom_core.matching._hypothesis import (
     CONFLICT,
@@ -33,7 +33,7 @@ SLIDE_ACROSS, SLIDE_GROWTH, SLIDE_TURN = 0.25, 0.02, 0.07
 """Up to here [m, m per metre along, rad] it is the same place but for a slide."""
 
 
-@njit(cache=True)
+@kernel
 def agreement(ref, cur, pose, figures):  # type: ignore[no-untyped-def]
     """Fill WALLS to AXIS: which walls, and circles, lie on each other under `pose`."""
     pairs = lying_pairs(ref.lines, cur.lines, pose, LYING_ANGLE, LYING_DISTANCE, LYING_OVERLAP)
@@ -73,14 +73,14 @@ def agreement(ref, cur, pose, figures):  # type: ignore[no-untyped-def]
     return pairs.shape[0] > 0 or round_walls > 0.0
 
 
-@njit(cache=True)
+@kernel
 def is_apart(row, best):  # type: ignore[no-untyped-def]
     """Is a hypothesis another place than the best one?"""
     far = math.hypot(row[0] - best[0], row[1] - best[1]) > APART
     return far or abs(wrap_angle(row[2] - best[2])) > TURNED
 
 
-@njit(cache=True)
+@kernel
 def is_slide(row, best, axis):  # type: ignore[no-untyped-def]
     """Is it the same place as the best one but for a slide along `axis`?"""
     dx, dy = row[0] - best[0], row[1] - best[1]
@@ -90,7 +90,7 @@ def is_slide(row, best, axis):  # type: ignore[no-untyped-def]
     return abs(wrap_angle(row[2] - best[2])) < SLIDE_TURN
 
 
-@njit(cache=True)
+@kernel
 def compare_with_rivals(ref, cur, table, kept, figures):  # type: ignore[no-untyped-def]
     """Fill all figures of the first row, the best, of a table of `kept` hypotheses."""
     figures[:] = 0.0

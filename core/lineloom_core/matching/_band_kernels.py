@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from lineloom_core.features._kernels import LENGTH, THETA, X1, X2, Y1, Y2
+from lineloom_core.kernels import kernel
 from lineloom_core.matching._agreement_kernels import AXIS, BROAD
 from lineloom_core.matching._free_space_kernels import CONFLICT, MATCHED, judge_thinned, thin_points
 from lineloom_core.matching._proposal_kernels import (
@@ -24,7 +24,7 @@ SLIDE_BASE, SLIDE_SLOPE = 0.16, 0.01
 PER_BAND, LEAST_SLIDE, WORTH_A_LOOK = 3, 0.5, 0.6
 
 
-@njit(cache=True)
+@kernel
 def band_offsets(ref, cur, phi, axis, pairs, count, values, weights, sides):  # type: ignore[no-untyped-def]
     """Constraints n . t = value of all pairs parallel to `axis`; side +1 or -1 by facing."""
     nx, ny = -math.sin(axis), math.cos(axis)
@@ -49,7 +49,7 @@ def band_offsets(ref, cur, phi, axis, pairs, count, values, weights, sides):  # 
     return m
 
 
-@njit(cache=True)
+@kernel
 def propose_bands(ref, cur, rotations, per_rotation, window):  # type: ignore[no-untyped-def]
     """Rows phi, axis, offset across, weight, both sides seen (1) or one (0); heaviest first."""
     phis = rotation_peaks(ref, cur, rotations, 0.25, math.radians(3.0))
@@ -107,7 +107,7 @@ def propose_bands(ref, cur, rotations, per_rotation, window):  # type: ignore[no
     return table[:rows][np.argsort(-table[:rows, 3], kind="mergesort")]
 
 
-@njit(cache=True)
+@kernel
 def slide_profile(ref, cur, ref_thin, cur_thin, band, profile):  # type: ignore[no-untyped-def]
     """Metres matched less twice those in conflict at every slide along a band, from end to end."""
     phi, axis, across = band[0], band[1], band[2]
@@ -122,7 +122,7 @@ def slide_profile(ref, cur, ref_thin, cur_thin, band, profile):  # type: ignore[
         profile[k + n] = SLIDE_STRIDE * (counts[MATCHED] - 2.0 * counts[CONFLICT])
 
 
-@njit(cache=True)
+@kernel
 def propose_slides(ref, cur, table, kept, figures, rotations, most):  # type: ignore[no-untyped-def]
     """The likeliest slides along all bands, as rows x, y, theta, weight, weight; likeliest first.
 

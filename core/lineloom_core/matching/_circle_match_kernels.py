@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from lineloom_core.features._circle_kernels import (
     ARC,
@@ -23,6 +22,7 @@ from lineloom_core.features._circle_kernels import (
     VAR_YY,
 )
 from lineloom_core.features._kernels import LENGTH, OFFSET, THETA
+from lineloom_core.kernels import kernel
 from lineloom_core.matching._proposal_kernels import (
     LONG_ENOUGH,
     compatible_pairs,
@@ -39,14 +39,14 @@ LEAST_APART = 0.4
 SAME_TURN = math.radians(3.0)
 
 
-@njit(cache=True)
+@kernel
 def same_circle(p, q):  # type: ignore[no-untyped-def]
     """May two circles be one: seen from the same side, and of one radius?"""
     noise = 3.0 * math.sqrt(p[VAR_RADIUS] + q[VAR_RADIUS])
     return p[SENSE] == q[SENSE] and abs(p[RADIUS] - q[RADIUS]) < noise + RADIUS_SLACK
 
 
-@njit(cache=True)
+@kernel
 def circle_pairs(ref, cur):  # type: ignore[no-untyped-def]
     """Rows (i, j) of circles that may be one."""
     out = np.empty((ref.shape[0] * cur.shape[0], 2), dtype=np.int64)
@@ -59,13 +59,13 @@ def circle_pairs(ref, cur):  # type: ignore[no-untyped-def]
     return out[:count]
 
 
-@njit(cache=True)
+@kernel
 def arc_length(p, q):  # type: ignore[no-untyped-def]
     """Metres of wall that a pair of circles stands for, as a line's length does."""
     return min(p[RADIUS] * p[ARC], q[RADIUS] * q[ARC], LONG_ENOUGH)
 
 
-@njit(cache=True)
+@kernel
 def related_turns(ref, ref_circles, cur, cur_circles, pairs, p, turns, weights):  # type: ignore[no-untyped-def]
     """The rotations that relations to one pair of circles name, with their weights; their count.
 
@@ -100,7 +100,7 @@ def related_turns(ref, ref_circles, cur, cur_circles, pairs, p, turns, weights):
     return count
 
 
-@njit(cache=True)
+@kernel
 def likely_turns(turns, weights, count, most, out):  # type: ignore[no-untyped-def]
     """The rotations that most weight agrees on to SAME_TURN, best first; their number."""
     left = weights[:count].copy()
@@ -129,7 +129,7 @@ def likely_turns(turns, weights, count, most, out):  # type: ignore[no-untyped-d
     return found
 
 
-@njit(cache=True)
+@kernel
 def centres_explained(ref, cur, pairs, pose, reach, taken):  # type: ignore[no-untyped-def]
     """Metres of arc whose centres fall on each other, nearer counts more, each circle once."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -144,7 +144,7 @@ def centres_explained(ref, cur, pairs, pose, reach, taken):  # type: ignore[no-u
     return taken.sum()
 
 
-@njit(cache=True)
+@kernel
 def propose_circles(  # type: ignore[no-untyped-def]
     ref, ref_circles, cur, cur_circles, by_lines, per_pair, pair_limit, half, reach
 ):
@@ -193,7 +193,7 @@ def propose_circles(  # type: ignore[no-untyped-def]
     return table[:rows][np.argsort(-table[:rows, 3], kind="mergesort")]
 
 
-@njit(cache=True)
+@kernel
 def is_there(table, first, last, tx, ty, phi):  # type: ignore[no-untyped-def]
     """Has table[first:last] nearly this pose already?"""
     for k in range(first, last):
@@ -203,7 +203,7 @@ def is_there(table, first, last, tx, ty, phi):  # type: ignore[no-untyped-def]
     return False
 
 
-@njit(cache=True)
+@kernel
 def centre_residual(p, q, c, s, pose):  # type: ignore[no-untyped-def]
     """Centre of current circle q on that of reference circle p: e (x, y), S (xx, xy, yy) of it.
 
@@ -217,7 +217,7 @@ def centre_residual(p, q, c, s, pose):  # type: ignore[no-untyped-def]
     return rx + pose[0] - p[CX], ry + pose[1] - p[CY], xx, xy, yy, rx, ry
 
 
-@njit(cache=True)
+@kernel
 def centre_weight(ex, ey, xx, xy, yy):  # type: ignore[no-untyped-def]
     """Weight matrix (xx, xy, yy) of a centre residual, less beyond 3 sigma; and e'We before."""
     det = xx * yy - xy * xy
@@ -227,7 +227,7 @@ def centre_weight(ex, ey, xx, xy, yy):  # type: ignore[no-untyped-def]
     return a * less, b * less, d * less, square
 
 
-@njit(cache=True)
+@kernel
 def accumulate_circles(ref, cur, pose, distance_gate, H, g):  # type: ignore[no-untyped-def]
     """Add the normal equations of centres on centres at `pose`; returns their metres of arc."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -254,7 +254,7 @@ def accumulate_circles(ref, cur, pose, distance_gate, H, g):  # type: ignore[no-
     return total
 
 
-@njit(cache=True)
+@kernel
 def accumulate_centre_noise(ref, cur, pose, distance_gate, H, M):  # type: ignore[no-untyped-def]
     """Add J'WJ and J'W S W J of centres on centres, S without the floor; squares, number."""
     c, s = math.cos(pose[2]), math.sin(pose[2])

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from lineloom_core.features._kernels import (
     EDGE,
@@ -22,6 +21,7 @@ from lineloom_core.features._kernels import (
     Y1,
     Y2,
 )
+from lineloom_core.kernels import kernel
 from lineloom_core.matching._circle_match_kernels import accumulate_centre_noise
 from lineloom_core.matching._refinement_kernels import (
     EDGE_VARIANCE,
@@ -44,7 +44,7 @@ FAR_OUT = 0.065
 """Points farther off their line [m] are not noise of it (the split threshold)."""
 
 
-@njit(cache=True)
+@kernel
 def line_noise(lines, points, beams, turn):  # type: ignore[no-untyped-def]
     """Variances of each line's direction and of its offset at its centroid: (n, 2) [rad^2, m^2].
 
@@ -90,7 +90,7 @@ def line_noise(lines, points, beams, turn):  # type: ignore[no-untyped-def]
     return out
 
 
-@njit(cache=True)
+@kernel
 def corner_partner(lines, ends, edges, i, side):  # type: ignore[no-untyped-def]
     """The line that makes an angle edge with line i, or -1: a jump edge."""
     x, y = edges[i, side, 0], edges[i, side, 1]
@@ -102,7 +102,7 @@ def corner_partner(lines, ends, edges, i, side):  # type: ignore[no-untyped-def]
     return -1
 
 
-@njit(cache=True)
+@kernel
 def edge_noise(lines, ends, edges, spacing, i, side, sign, gain, G, M):  # type: ignore[no-untyped-def]
     """Add what the noise of one edge point, taken along its line, does through `gain` (3,).
 
@@ -134,7 +134,7 @@ def edge_noise(lines, ends, edges, spacing, i, side, sign, gain, G, M):  # type:
             M[a, b] += gain[a] * gain[b] * wide * wide / 3.0
 
 
-@njit(cache=True)
+@kernel
 def accumulate_noise(  # type: ignore[no-untyped-def]
     ref, ref_ends, ref_edges, ref_noise, ref_spacing,
     cur, cur_ends, cur_edges, cur_noise, cur_spacing,
@@ -206,7 +206,7 @@ def accumulate_noise(  # type: ignore[no-untyped-def]
     return squares, used
 
 
-@njit(cache=True)
+@kernel
 def add_squares(G, noise, M):  # type: ignore[no-untyped-def]
     """M += sum over lines of G diag(noise) G'."""
     for i in range(G.shape[0]):
@@ -216,7 +216,7 @@ def add_squares(G, noise, M):  # type: ignore[no-untyped-def]
                     M[a, b] += G[i, a, p] * G[i, b, p] * noise[i, p]
 
 
-@njit(cache=True)
+@kernel
 def scan_noise(ref, cur, pose, angle_gate, distance_gate, H, M):  # type: ignore[no-untyped-def]
     """`accumulate_noise` with the noise that the lines' own points show, and that of circles."""
     ref_noise = line_noise(ref.lines, ref.points, ref.beams, ref.ranges.shape[0])
@@ -230,7 +230,7 @@ def scan_noise(ref, cur, pose, angle_gate, distance_gate, H, M):  # type: ignore
     return squares + more, used + others
 
 
-@njit(cache=True)
+@kernel
 def invert3(A, out):  # type: ignore[no-untyped-def]
     """out = A^-1 of a symmetric positive definite 3x3 matrix."""
     out[0, 0] = A[1, 1] * A[2, 2] - A[1, 2] * A[1, 2]
@@ -246,7 +246,7 @@ def invert3(A, out):  # type: ignore[no-untyped-def]
             out[b, a] = out[a, b]
 
 
-@njit(cache=True)
+@kernel
 def congruence(A, S, out):  # type: ignore[no-untyped-def]
     """out = A S A' of 3x3 matrices, A and S symmetric."""
     for a in range(3):
@@ -259,7 +259,7 @@ def congruence(A, S, out):  # type: ignore[no-untyped-def]
             out[b, a] = total
 
 
-@njit(cache=True)
+@kernel
 def forget_along(covariance, axis, sigma):  # type: ignore[no-untyped-def]
     """Make sigma [m] of what is known along `axis`, and keep what is known across and of the turn.
 
@@ -281,7 +281,7 @@ def forget_along(covariance, axis, sigma):  # type: ignore[no-untyped-def]
     covariance[1, 1] += along * s * s + across * c * c
 
 
-@njit(cache=True)
+@kernel
 def fill_covariance(  # type: ignore[no-untyped-def]
     ref, cur, pose, angle_gate, distance_gate, axis, sigma, always, covariance
 ):

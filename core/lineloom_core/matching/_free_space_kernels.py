@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from lineloom_core.kernels import kernel
 
 MATCHED, CONFLICT, OCCLUDED, OUTSIDE = 0, 1, 2, 3
 
 
-@njit(cache=True)
+@kernel
 def bearing(y, x):  # type: ignore[no-untyped-def]
     """atan2 to within 1e-5 rad, a thousandth of a beam's spacing, in a third of the time."""
     ax, ay = abs(x), abs(y)
@@ -32,7 +33,7 @@ def bearing(y, x):  # type: ignore[no-untyped-def]
     return -a if y < 0.0 else a
 
 
-@njit(cache=True)
+@kernel
 def beam_of(x, y, angle_min, per_radian, turn):  # type: ignore[no-untyped-def]
     """The beam nearest to the direction of (x, y); may be beyond the last one."""
     f = (bearing(y, x) - angle_min) * per_radian + 0.5
@@ -45,7 +46,7 @@ def beam_of(x, y, angle_min, per_radian, turn):  # type: ignore[no-untyped-def]
     return int(f)
 
 
-@njit(cache=True)
+@kernel
 def judge_point(x, y, ranges, angle_min, per_radian, turn, base, slope):  # type: ignore[no-untyped-def]
     """One point in the frame of one sweep: MATCHED, CONFLICT, OCCLUDED or OUTSIDE.
 
@@ -76,7 +77,7 @@ def judge_point(x, y, ranges, angle_min, per_radian, turn, base, slope):  # type
     return CONFLICT if rho < nearest - tol else OCCLUDED
 
 
-@njit(cache=True)
+@kernel
 def judge_points(  # type: ignore[no-untyped-def]
     points, spacing, step, pose, ranges, angle_min, angle_increment, base, slope, counts
 ):
@@ -97,7 +98,7 @@ def judge_points(  # type: ignore[no-untyped-def]
         counts[judge_point(x, y, ranges, angle_min, per_radian, turn, base, slope)] += w
 
 
-@njit(cache=True)
+@kernel
 def judge_each(points, pose, ranges, angle_min, angle_increment, base, slope, verdicts):  # type: ignore[no-untyped-def]
     """`judge_point` for every point (n, 2), moved by `pose` into the sweep's frame."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -109,7 +110,7 @@ def judge_each(points, pose, ranges, angle_min, angle_increment, base, slope, ve
         verdicts[k] = judge_point(x, y, ranges, angle_min, per_radian, turn, base, slope)
 
 
-@njit(cache=True)
+@kernel
 def thin_points(points, spacing, stride):  # type: ignore[no-untyped-def]
     """Every so many metres of wall one point, (k, 2): each stands for `stride` metres.
 
@@ -128,7 +129,7 @@ def thin_points(points, spacing, stride):  # type: ignore[no-untyped-def]
     return out[:count]
 
 
-@njit(cache=True)
+@kernel
 def judge_thinned(ref, cur, ref_thin, cur_thin, pose, base, slope, counts):  # type: ignore[no-untyped-def]
     """`judge_pair` of two sweeps by thinned points: counts (4,) are numbers of points."""
     counts[:] = 0.0
@@ -148,7 +149,7 @@ def judge_thinned(ref, cur, ref_thin, cur_thin, pose, base, slope, counts):  # t
         counts[judge_point(x, y, cur.ranges, cur.angle_min, per_radian, turn, base, slope)] += 1.0
 
 
-@njit(cache=True)
+@kernel
 def judge_cloud(  # type: ignore[no-untyped-def]
     points, step, pose, ranges, angle_mins, angle_increments, poses, base, slope, counts
 ):
@@ -188,7 +189,7 @@ def judge_cloud(  # type: ignore[no-untyped-def]
             counts[OUTSIDE] += 1.0
 
 
-@njit(cache=True)
+@kernel
 def invert_pose(pose, out):  # type: ignore[no-untyped-def]
     """out = pose^-1."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -197,7 +198,7 @@ def invert_pose(pose, out):  # type: ignore[no-untyped-def]
     out[2] = -pose[2]
 
 
-@njit(cache=True)
+@kernel
 def judge_pair(  # type: ignore[no-untyped-def]
     ref_points,
     ref_ranges,

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from lineloom_core.kernels import kernel
 from lineloom_core.matching._proposal_kernels import wrap_angle
 
 COLUMNS = 16
@@ -19,13 +19,13 @@ OVERLAP_WEIGHT, CONFLICT_WEIGHT = 0.25, 2.5
 """Of overlapping lines and of conflicts beside what is matched (chosen on simulated pairs)."""
 
 
-@njit(cache=True)
+@kernel
 def evidence(row):  # type: ignore[no-untyped-def]
     """What speaks for a hypothesis, in metres of wall: matched and overlap, less conflicts."""
     return row[MATCHED] + OVERLAP_WEIGHT * row[OVERLAP] - CONFLICT_WEIGHT * row[CONFLICT]
 
 
-@njit(cache=True)
+@kernel
 def fill_row(out, pose, explained, votes, counts, overlap, H):  # type: ignore[no-untyped-def]
     """Write a hypothesis."""
     out[:3] = pose
@@ -36,7 +36,7 @@ def fill_row(out, pose, explained, votes, counts, overlap, H):  # type: ignore[n
     out[13], out[14], out[15] = H[1, 1], H[1, 2], H[2, 2]
 
 
-@njit(cache=True)
+@kernel
 def is_known(table, kept, pose):  # type: ignore[no-untyped-def]
     """Has one of the first `kept` rows nearly this pose already?"""
     for k in range(kept):
@@ -46,7 +46,7 @@ def is_known(table, kept, pose):  # type: ignore[no-untyped-def]
     return False
 
 
-@njit(cache=True)
+@kernel
 def translation_information(a, b, c, d, e, f):  # type: ignore[no-untyped-def]
     """Least eigenvalue [1/m^2] of the translation's Schur complement, and its direction [rad].
 
@@ -59,7 +59,7 @@ def translation_information(a, b, c, d, e, f):  # type: ignore[no-untyped-def]
     return least, np.mod(strong + 0.5 * math.pi, math.pi)
 
 
-@njit(cache=True)
+@kernel
 def turn_information(a, b, c, d, e, f):  # type: ignore[no-untyped-def]
     """Information [1/rad^2] of the rotation while the translation is not known."""
     a, d = a + 0.01, d + 0.01  # where nothing fixes a translation it says nothing of the rotation

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from lineloom_core.kernels import kernel
 from lineloom_core.matching._agreement_kernels import (
     BEST,
     FIGURES,
@@ -51,7 +51,7 @@ SAFE_EVIDENCE, SAFE_WALLS, SAFE_LEAN, SAFE_RIVAL = 4.0, 3.0, 0.2, 0.5
 """Evidence [m], walls, metres that fix the weaker direction, and the rival's share of evidence."""
 
 
-@njit(cache=True)
+@kernel
 def settle_slide(ref, cur, ref_thin, cur_thin, H, pose, hopeless):  # type: ignore[no-untyped-def]
     """Where lines hardly fix `pose` along one direction, slide it to where the points fit best.
 
@@ -81,7 +81,7 @@ def settle_slide(ref, cur, ref_thin, cur_thin, H, pose, hopeless):  # type: igno
     pose[1] += uy * where * SLIDE_STEP
 
 
-@njit(cache=True)
+@kernel
 def settle(ref, cur, ref_thin, cur_thin, row, iterations, table, kept):  # type: ignore[no-untyped-def]
     """Refine a proposal (x, y, theta, explained, votes), judge it, and add it to the table.
 
@@ -109,7 +109,7 @@ def settle(ref, cur, ref_thin, cur_thin, row, iterations, table, kept):  # type:
     return kept + 1
 
 
-@njit(cache=True)
+@kernel
 def rank_coarsely(ref, cur, proposals, most):  # type: ignore[no-untyped-def]
     """Steps 3 and 5, coarse: what lines explain and free space says. Rank by proposal."""
     ref_thin = thin_points(ref.points, ref.angle_increment, COARSE_STRIDE)
@@ -126,7 +126,7 @@ def rank_coarsely(ref, cur, proposals, most):  # type: ignore[no-untyped-def]
     return rank
 
 
-@njit(cache=True)
+@kernel
 def best_first(table, kept):  # type: ignore[no-untyped-def]
     """The first `kept` rows by falling evidence; equals keep their order."""
     rank = np.empty(kept)
@@ -135,7 +135,7 @@ def best_first(table, kept):  # type: ignore[no-untyped-def]
     return table[:kept][np.argsort(-rank, kind="mergesort")]
 
 
-@njit(cache=True)
+@kernel
 def is_safe(figures):  # type: ignore[no-untyped-def]
     """Need nobody look for slides: walls of several directions fit, and nothing else does."""
     best = figures[BEST]
@@ -147,7 +147,7 @@ def is_safe(figures):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True)
+@kernel
 def settle_proposals(  # type: ignore[no-untyped-def]
     ref, cur, ref_thin, cur_thin, proposals, rank, most, iterations, table, figures
 ):
@@ -172,7 +172,7 @@ def settle_proposals(  # type: ignore[no-untyped-def]
     return kept
 
 
-@njit(cache=True)
+@kernel
 def match_sweeps(ref, cur, search):  # type: ignore[no-untyped-def]
     """Steps 1 to 7 on two sweeps: the settled hypotheses, best first, and the best one's figures.
 

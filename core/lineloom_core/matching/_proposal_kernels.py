@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from lineloom_core.features._kernels import (
     EDGE,
@@ -21,6 +20,7 @@ from lineloom_core.features._kernels import (
     Y1,
     Y2,
 )
+from lineloom_core.kernels import kernel
 
 BINS = 360
 LONG_ENOUGH = 3.0
@@ -28,13 +28,13 @@ MOST_CELLS = 4096
 """Cells that may have votes."""
 
 
-@njit(cache=True)
+@kernel
 def wrap_angle(a):  # type: ignore[no-untyped-def]
     """Wrap to [-pi, pi)."""
     return a - 2.0 * math.pi * math.floor((a + math.pi) / (2.0 * math.pi))
 
 
-@njit(cache=True)
+@kernel
 def rotation_histogram(ref, cur):  # type: ignore[no-untyped-def]
     """Direction differences of all pairs of oriented lines, one degree a bin, shared over two."""
     h = np.zeros(BINS)
@@ -50,7 +50,7 @@ def rotation_histogram(ref, cur):  # type: ignore[no-untyped-def]
     return h
 
 
-@njit(cache=True)
+@kernel
 def rotation_peaks(ref, cur, most, least_share, reach):  # type: ignore[no-untyped-def]
     """Rotations phi with theta_ref = theta_cur + phi that many pairs agree on, best first."""
     h = rotation_histogram(ref, cur)
@@ -90,7 +90,7 @@ def rotation_peaks(ref, cur, most, least_share, reach):  # type: ignore[no-untyp
     return peaks[:count]
 
 
-@njit(cache=True)
+@kernel
 def compatible_pairs(ref, cur, phi, tolerance, most, pairs):  # type: ignore[no-untyped-def]
     """Pairs (i, j) whose directions agree under phi; the `most` heaviest. Returns their count."""
     count = 0
@@ -117,7 +117,7 @@ def compatible_pairs(ref, cur, phi, tolerance, most, pairs):  # type: ignore[no-
     return count
 
 
-@njit(cache=True)
+@kernel
 def overlap_length(line, ux, uy, ax, ay, bx, by):  # type: ignore[no-untyped-def]
     """Length that segment a-b shares with `line` when projected on its direction (ux, uy)."""
     s = ux * line[X1] + uy * line[Y1]
@@ -125,7 +125,7 @@ def overlap_length(line, ux, uy, ax, ay, bx, by):  # type: ignore[no-untyped-def
     return min(max(ta, tb), s + line[LENGTH]) - max(min(ta, tb), s)
 
 
-@njit(cache=True)
+@kernel
 def add_vote(slots, cells, used, cell, half, w, tx, ty):  # type: ignore[no-untyped-def]
     """Add a vote for a translation to its cell; returns the number of cells in use."""
     n = slots.shape[0]
@@ -147,7 +147,7 @@ def add_vote(slots, cells, used, cell, half, w, tx, ty):  # type: ignore[no-unty
     return used
 
 
-@njit(cache=True)
+@kernel
 def vote_translations(  # type: ignore[no-untyped-def]
     ref, ref_ends, ref_edges, cur, cur_ends, cur_edges, phi, pairs, count, cell, half, slots, cells
 ):
@@ -204,7 +204,7 @@ def vote_translations(  # type: ignore[no-untyped-def]
     return used
 
 
-@njit(cache=True)
+@kernel
 def vote_peaks(slots, cells, used, most, out):  # type: ignore[no-untyped-def]
     """The best cells (3 x 3 sums, non-maxima suppressed) as rows x, y, votes; clears the slots."""
     n = slots.shape[0]
@@ -238,7 +238,7 @@ def vote_peaks(slots, cells, used, most, out):  # type: ignore[no-untyped-def]
     return count
 
 
-@njit(cache=True)
+@kernel
 def explained_length(ref, cur, phi, pairs, count, tx, ty, reach, taken):  # type: ignore[no-untyped-def]
     """Length of current lines that lie on reference lines, nearer counts more, each once."""
     c, s = math.cos(phi), math.sin(phi)
@@ -257,7 +257,7 @@ def explained_length(ref, cur, phi, pairs, count, tx, ty, reach, taken):  # type
     return taken.sum()
 
 
-@njit(cache=True)
+@kernel
 def lying_pairs(ref, cur, pose, angle_gate, distance_gate, least_overlap):  # type: ignore[no-untyped-def]
     """Rows i, j, overlap, distance, angle of the lines that lie on each other under `pose`."""
     out = np.empty((ref.shape[0] * cur.shape[0], 5))
@@ -283,7 +283,7 @@ def lying_pairs(ref, cur, pose, angle_gate, distance_gate, least_overlap):  # ty
     return out[:count]
 
 
-@njit(cache=True)
+@kernel
 def propose(  # type: ignore[no-untyped-def]
     ref,
     ref_ends,

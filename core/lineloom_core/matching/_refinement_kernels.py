@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from lineloom_core.features._circle_kernels import CIRCLE_COLUMNS
 from lineloom_core.features._kernels import (
@@ -23,6 +22,7 @@ from lineloom_core.features._kernels import (
     Y1,
     Y2,
 )
+from lineloom_core.kernels import kernel
 from lineloom_core.matching._circle_match_kernels import accumulate_circles
 from lineloom_core.matching._proposal_kernels import wrap_angle
 
@@ -36,7 +36,7 @@ MOST_TURNED, MOST_MOVED = math.radians(8.0), 0.6
 """Farther than this [rad, m] no refinement takes a pose."""
 
 
-@njit(cache=True)
+@kernel
 def solve3(A, b):  # type: ignore[no-untyped-def]
     """Solve a symmetric 3x3 system by Cramer's rule; zeros where singular."""
     c00 = A[1, 1] * A[2, 2] - A[1, 2] * A[2, 1]
@@ -55,7 +55,7 @@ def solve3(A, b):  # type: ignore[no-untyped-def]
     return x
 
 
-@njit(cache=True)
+@kernel
 def huber(e, var, sigmas):  # type: ignore[no-untyped-def]
     """Weight of a residual of that variance, less beyond so many standard deviations."""
     if e * e <= sigmas * sigmas * var:
@@ -63,7 +63,7 @@ def huber(e, var, sigmas):  # type: ignore[no-untyped-def]
     return sigmas / (math.sqrt(var) * abs(e))
 
 
-@njit(cache=True)
+@kernel
 def line_residual(ref, ux, uy, cur, c, s, pose, angle_gate, distance_gate):  # type: ignore[no-untyped-def]
     """One current line against one reference line at `pose`, c and s its cosine and sine.
 
@@ -95,7 +95,7 @@ def line_residual(ref, ux, uy, cur, c, s, pose, angle_gate, distance_gate):  # t
     return shared, e, da, px, py, middle - 0.5 * (s1 + s2), middle - 0.5 * (ta + tb)
 
 
-@njit(cache=True)
+@kernel
 def weights_of(ref, cur, mr, mc):  # type: ignore[no-untyped-def]
     """The variances that the refinement weighs a pair of lines by: across, direction."""
     var = ref[VAR_OFFSET] + cur[VAR_OFFSET] + ACROSS_FLOOR
@@ -103,7 +103,7 @@ def weights_of(ref, cur, mr, mc):  # type: ignore[no-untyped-def]
     return var, ref[VAR_THETA] + cur[VAR_THETA] + ANGLE_FLOOR
 
 
-@njit(cache=True)
+@kernel
 def add_residual(H, g, jx, jy, jt, w, e):  # type: ignore[no-untyped-def]
     """Add one weighted residual to the upper triangle of H and to g."""
     H[0, 0] += w * jx * jx
@@ -117,7 +117,7 @@ def add_residual(H, g, jx, jy, jt, w, e):  # type: ignore[no-untyped-def]
     g[2] -= w * jt * e
 
 
-@njit(cache=True)
+@kernel
 def directions(lines):  # type: ignore[no-untyped-def]
     """Cosine and sine of each line's direction, (n, 2)."""
     out = np.empty((lines.shape[0], 2))
@@ -126,7 +126,7 @@ def directions(lines):  # type: ignore[no-untyped-def]
     return out
 
 
-@njit(cache=True)
+@kernel
 def lines_near(ref, ref_along, cur, pose, angle_reach, pairs):  # type: ignore[no-untyped-def]
     """Fill `pairs` (i, j) with the lines that may come to lie on each other near `pose`.
 
@@ -150,7 +150,7 @@ def lines_near(ref, ref_along, cur, pose, angle_reach, pairs):  # type: ignore[n
     return count
 
 
-@njit(cache=True)
+@kernel
 def accumulate_lines(  # type: ignore[no-untyped-def]
     ref, ref_along, ref_ends, ref_edges, cur, cur_ends, cur_edges, pairs, count,
     pose, angle_gate, distance_gate, H, g,
@@ -195,7 +195,7 @@ def accumulate_lines(  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True)
+@kernel
 def refine_all(  # type: ignore[no-untyped-def]
     ref,
     ref_ends,
@@ -244,7 +244,7 @@ def refine_all(  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True)
+@kernel
 def refine(  # type: ignore[no-untyped-def]
     ref, ref_ends, ref_edges, cur, cur_ends, cur_edges, pose, H, iterations
 ):

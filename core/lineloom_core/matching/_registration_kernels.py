@@ -10,15 +10,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from lineloom_core.features._kernels import FIRST, LAST, OFFSET, THETA
+from lineloom_core.kernels import kernel
 
 CELL = 0.1
 ON_LINE = 0.06
 
 
-@njit(cache=True)
+@kernel
 def line_normals(points, beams, lines, normals):  # type: ignore[no-untyped-def]
     """Give the points of a line segment the line's normal: a wall seen by many beams is straight.
 
@@ -34,7 +34,7 @@ def line_normals(points, beams, lines, normals):  # type: ignore[no-untyped-def]
                     normals[k, 0], normals[k, 1] = nx, ny
 
 
-@njit(cache=True)
+@kernel
 def bounds(points, pose, reach, box):  # type: ignore[no-untyped-def]
     """Widen box (min x, min y, max x, max y) by the points within `reach` of the laser."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -47,7 +47,7 @@ def bounds(points, pose, reach, box):  # type: ignore[no-untyped-def]
         box[2], box[3] = max(box[2], x), max(box[3], y)
 
 
-@njit(cache=True)
+@kernel
 def insert_points(index, surface, used, ox, oy, points, normals, pose, reach):  # type: ignore[no-untyped-def]
     """Add points (laser frame at `pose`) to the cells; returns the number of rows in use.
 
@@ -100,7 +100,7 @@ def insert_points(index, surface, used, ox, oy, points, normals, pose, reach):  
     return used
 
 
-@njit(cache=True)
+@kernel
 def fill_field(field, surface, used, ox, oy):  # type: ignore[no-untyped-def]
     """Stamp every surface cell into the likelihood field: 255 on it, falling to 0 at 0.3 m."""
     nx_cells, ny_cells = field.shape
@@ -117,7 +117,7 @@ def fill_field(field, surface, used, ox, oy):  # type: ignore[no-untyped-def]
                 field[a, b] = max(field[a, b], stamp[a - gx + 2, b - gy + 2])
 
 
-@njit(cache=True)
+@kernel
 def thin(points, spacing, most):  # type: ignore[no-untyped-def]
     """Rows at least `spacing` from the one kept before; of those every k-th, up to `most`."""
     n = points.shape[0]
@@ -135,7 +135,7 @@ def thin(points, spacing, most):  # type: ignore[no-untyped-def]
     return keep[:m:step]
 
 
-@njit(cache=True)
+@kernel
 def field_score(field, ox, oy, px, py, c, s, tx, ty):  # type: ignore[no-untyped-def]
     """Sum of the field over points rotated by (c, s) and moved by (tx, ty)."""
     nx_cells, ny_cells = field.shape
@@ -150,7 +150,7 @@ def field_score(field, ox, oy, px, py, c, s, tx, ty):  # type: ignore[no-untyped
     return total
 
 
-@njit(cache=True)
+@kernel
 def correlate(field, ox, oy, points, guess, reach_xy, reach_theta, step_xy, step_theta, pull):  # type: ignore[no-untyped-def]
     """Best pose in a window around `guess` by exhaustive search; returns x, y, theta, score.
 
@@ -179,7 +179,7 @@ def correlate(field, ox, oy, points, guess, reach_xy, reach_theta, step_xy, step
     return best
 
 
-@njit(cache=True)
+@kernel
 def register(  # type: ignore[no-untyped-def]
     index, surface, ox, oy, points, normals, weights, guess, prior, gate, sigma, iterations
 ):

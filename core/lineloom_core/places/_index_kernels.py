@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from lineloom_core.features._kernels import LENGTH, OFFSET, THETA, X1, X2, Y1, Y2
+from lineloom_core.kernels import kernel
 from lineloom_core.matching._proposal_kernels import wrap_angle
 
 CORNER_COLUMNS, LINE_COLUMNS = 8, 8
@@ -20,7 +20,7 @@ TURNS = 36
 MOST_VOTES = 4096
 
 
-@njit(cache=True)
+@kernel
 def short_lines(lines):  # type: ignore[no-untyped-def]
     """What the index needs of a place's lines, (n, 8)."""
     out = np.empty((lines.shape[0], LINE_COLUMNS))
@@ -32,7 +32,7 @@ def short_lines(lines):  # type: ignore[no-untyped-def]
     return out
 
 
-@njit(cache=True)
+@kernel
 def side_of(along, length, reach):  # type: ignore[no-untyped-def]
     """Where a point `along` metres from a line's start lies: 0 at its start, 1 in it, 2 at its end.
 
@@ -46,7 +46,7 @@ def side_of(along, length, reach):  # type: ignore[no-untyped-def]
     return 2 if along > length - near else 1
 
 
-@njit(cache=True)
+@kernel
 def corners_of(lines, reach, least_sine, most):  # type: ignore[no-untyped-def]
     """Corners of a place: where two of its lines meet, or would within `reach` m, heaviest first.
 
@@ -80,7 +80,7 @@ def corners_of(lines, reach, least_sine, most):  # type: ignore[no-untyped-def]
     return out[:count][order[:most]]
 
 
-@njit(cache=True)
+@kernel
 def vote(ref, cur, half, cell, grid, votes, cells, touched):  # type: ignore[no-untyped-def]
     """Let every pair of like corners vote for the pose it implies; returns votes and cells used.
 
@@ -116,7 +116,7 @@ def vote(ref, cur, half, cell, grid, votes, cells, touched):  # type: ignore[no-
     return count, used
 
 
-@njit(cache=True)
+@kernel
 def around(grid, gt, gx, gy):  # type: ignore[no-untyped-def]
     """Votes in a cell and its 26 neighbours."""
     n = grid.shape[1]
@@ -129,7 +129,7 @@ def around(grid, gt, gx, gy):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True)
+@kernel
 def pose_of_peak(ref, cur, votes, cells, count, peak, pose):  # type: ignore[no-untyped-def]
     """The mean pose of the votes in and around a cell."""
     total = turn = 0.0
@@ -153,7 +153,7 @@ def pose_of_peak(ref, cur, votes, cells, count, peak, pose):  # type: ignore[no-
     pose[0], pose[1], pose[2] = tx / total, ty / total, phi
 
 
-@njit(cache=True)
+@kernel
 def beside(cell, peak):  # type: ignore[no-untyped-def]
     """Whether a cell is the peak's or one of its neighbours."""
     turn = (cell[0] - peak[0]) % TURNS
@@ -161,7 +161,7 @@ def beside(cell, peak):  # type: ignore[no-untyped-def]
     return near and abs(cell[1] - peak[1]) <= 1 and abs(cell[2] - peak[2]) <= 1
 
 
-@njit(cache=True)
+@kernel
 def lying_length(ref, cur, pose, reach, cos_gate):  # type: ignore[no-untyped-def]
     """Metres of current lines that lie on reference lines, nearer counts more, each once."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -187,7 +187,7 @@ def lying_length(ref, cur, pose, reach, cos_gate):  # type: ignore[no-untyped-de
     return total
 
 
-@njit(cache=True)
+@kernel
 def likeness(ref, ref_lines, cur, cur_lines, half, cell, peaks, reach, grid, votes, cells, touched):  # type: ignore[no-untyped-def]
     """The most length that any of the best voted poses explains [m]; clears the grid."""
     count, used = vote(ref, cur, half, cell, grid, votes, cells, touched)
@@ -213,7 +213,7 @@ def likeness(ref, ref_lines, cur, cur_lines, half, cell, peaks, reach, grid, vot
     return best
 
 
-@njit(cache=True)
+@kernel
 def likeness_to_all(  # type: ignore[no-untyped-def]
     corners, lines, corner_ends, line_ends, chosen, cur, cur_lines, half, cell, peaks, reach, out
 ):

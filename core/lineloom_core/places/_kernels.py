@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from lineloom_core.kernels import kernel
 from lineloom_core.matching._free_space_kernels import (
     CONFLICT,
     MATCHED,
@@ -18,7 +18,7 @@ from lineloom_core.matching._proposal_kernels import propose, wrap_angle
 from lineloom_core.matching._refinement_kernels import refine
 
 
-@njit(cache=True)
+@kernel
 def judge_places(  # type: ignore[no-untyped-def]
     ref_points,
     ref_ranges,
@@ -48,7 +48,7 @@ def judge_places(  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True)
+@kernel
 def tally_sweeps(  # type: ignore[no-untyped-def]
     points, pose, ranges, angle_mins, angle_increments, poses, base, slope, out
 ):
@@ -77,7 +77,7 @@ def tally_sweeps(  # type: ignore[no-untyped-def]
         out[k, 0], out[k, 1] = hits, misses
 
 
-@njit(cache=True)
+@kernel
 def match_places(  # type: ignore[no-untyped-def]
     ref,
     ref_ends,
@@ -167,7 +167,7 @@ def match_places(  # type: ignore[no-untyped-def]
     return out[:kept][np.argsort(-rank, kind="mergesort")]
 
 
-@njit(cache=True)
+@kernel
 def place_evidence(matched, conflict, overlap):  # type: ignore[no-untyped-def]
     """What speaks for a hypothesis, in metres: points are cells of 0.1 m."""
     return overlap + 0.1 * matched - 0.3 * conflict

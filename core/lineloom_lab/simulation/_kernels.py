@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+from lineloom_core.kernels import kernel
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
@@ -21,7 +21,7 @@ Ints = NDArray[np.int64]
 _END_SLACK = 1e-9
 
 
-@njit(cache=True)
+@kernel
 def _cell_span(low: float, high: float, origin: float, cell: float, count: int) -> tuple[int, int]:
     """Return the first and last index of the cells that [low, high] touches, within the grid."""
     first = math.floor((low - origin) / cell - 1e-9)
@@ -29,7 +29,7 @@ def _cell_span(low: float, high: float, origin: float, cell: float, count: int) 
     return max(0, min(first, count - 1)), max(0, min(last, count - 1))
 
 
-@njit(cache=True)
+@kernel
 def _touches_cell(
     x1: float, y1: float, x2: float, y2: float, cx: float, cy: float, half: float
 ) -> bool:
@@ -38,7 +38,7 @@ def _touches_cell(
     return abs(nx * (cx - x1) + ny * (cy - y1)) <= half * (abs(nx) + abs(ny)) * (1.0 + 1e-9) + 1e-12
 
 
-@njit(cache=True)
+@kernel
 def grid_walls(
     walls: Floats, origin_x: float, origin_y: float, cell: float, columns: int, rows: int
 ) -> tuple[Ints, Ints]:
@@ -70,7 +70,7 @@ def grid_walls(
     return starts, members
 
 
-@njit(cache=True)
+@kernel
 def _hit(walls: Floats, i: int, ox: float, oy: float, dx: float, dy: float) -> float:
     """Return how far along the unit beam wall i is met, or infinity."""
     ex, ey = walls[i, 2] - walls[i, 0], walls[i, 3] - walls[i, 1]
@@ -85,7 +85,7 @@ def _hit(walls: Floats, i: int, ox: float, oy: float, dx: float, dy: float) -> f
     return distance if distance >= 0.0 else math.inf
 
 
-@njit(cache=True)
+@kernel
 def _enter(
     o: float, d: float, low: float, high: float, t0: float, t1: float
 ) -> tuple[float, float]:
@@ -96,7 +96,7 @@ def _enter(
     return max(t0, min(a, b)), min(t1, max(a, b))
 
 
-@njit(cache=True)
+@kernel
 def _stride(o: float, d: float, origin: float, cell: float, at: int) -> tuple[int, float, float]:
     """Return for one axis: the step from cell to cell, where the beam leaves cell `at`, and how far
     it is from one border to the next."""
@@ -106,7 +106,7 @@ def _stride(o: float, d: float, origin: float, cell: float, at: int) -> tuple[in
     return (1 if d > 0.0 else -1), (origin + ahead * cell - o) / d, cell / abs(d)
 
 
-@njit(cache=True)
+@kernel
 def _cast(
     walls: Floats,
     starts: Ints,
@@ -155,7 +155,7 @@ def _cast(
     return best, wall
 
 
-@njit(cache=True)
+@kernel
 def cast_beams(
     walls: Floats,
     starts: Ints,
@@ -180,7 +180,7 @@ def cast_beams(
     return ranges
 
 
-@njit(cache=True)
+@kernel
 def seen_surfaces(
     walls: Floats,
     starts: Ints,
@@ -216,7 +216,7 @@ def seen_surfaces(
     return seen
 
 
-@njit(cache=True)
+@kernel
 def _point_to_wall(walls: Floats, i: int, x: float, y: float) -> float:
     """Return the squared distance of a point to wall i."""
     ex, ey = walls[i, 2] - walls[i, 0], walls[i, 3] - walls[i, 1]
@@ -227,7 +227,7 @@ def _point_to_wall(walls: Floats, i: int, x: float, y: float) -> float:
     return distance
 
 
-@njit(cache=True)
+@kernel
 def _point_to_move(x: float, y: float, px: float, py: float, qx: float, qy: float) -> float:
     """Return the squared distance of a point to the straight move from p to q."""
     ex, ey = qx - px, qy - py
@@ -236,7 +236,7 @@ def _point_to_move(x: float, y: float, px: float, py: float, qx: float, qy: floa
     return (x - px - u * ex) ** 2 + (y - py - u * ey) ** 2
 
 
-@njit(cache=True)
+@kernel
 def move_clearance(walls: Floats, px: float, py: float, qx: float, qy: float, cap: float) -> float:
     """Return the least distance between the straight move p to q and any wall, at most `cap`."""
     best: float = cap * cap
@@ -261,7 +261,7 @@ def move_clearance(walls: Floats, px: float, py: float, qx: float, qy: float, ca
     return math.sqrt(best)
 
 
-@njit(cache=True)
+@kernel
 def clearance_map(
     walls: Floats,
     origin_x: float,

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import importlib.metadata
-import os
 import platform
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 from lineloom.cli.checkup import Finding, noted, ok, wrong
 
@@ -16,13 +14,13 @@ _INSTALL = "pip install lineloom-client[server]"
 
 
 def check_installation() -> Iterator[Finding]:
-    """Yield what is found of Python, the packages, gtsam and numba's cache."""
+    """Yield what is found of Python, the packages, gtsam and the compiled kernels."""
     yield ok("python", f"{platform.python_version()}, {sys.executable}")
     yield from _packages()
     if _installed("lineloom-core") is None:
         return
     yield _gtsam()
-    yield _numba_cache()
+    yield _kernels()
 
 
 def _packages() -> Iterator[Finding]:
@@ -59,27 +57,31 @@ def _gtsam() -> Finding:
     return ok("gtsam", f"{version}, solves")
 
 
-def _numba_cache() -> Finding:
-    """Look whether compiled kernels can be kept; without, every start compiles for a minute."""
+def _kernels() -> Finding:
+    """Look whether compiled kernels can be kept; without, every start compiles for minutes."""
     try:
-        import lineloom_core
         import numba
+        from lineloom_core.kernels import folders
+        from lineloom_core.kernels.target import target_name
+
+        target = target_name()
     except Exception as error:
         return wrong("numba", f"does not work: {error}", f"`{_INSTALL}` again, in a fresh .venv")
-    package = Path(lineloom_core.__file__).parent
-    kept = sum(1 for _ in package.rglob("*.nbi"))
-    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    place, version = folders.writable(), numba.__version__
+    kept = folders.kept("lineloom_core", target)
     if kept:
-        return ok("numba", f"{numba.__version__}, {kept} compiled kernels kept")
-    place = Path(chosen) if chosen else package
+        return ok("numba", f"{version}, {kept} kernels compiled for {target}")
     try:
+        if place is None:
+            raise OSError(None, "no folder can be written")
+        place.mkdir(parents=True, exist_ok=True)
         probe = place / ".lineloom-doctor"
         probe.touch()
         probe.unlink()
     except OSError as error:
-        advice = "set NUMBA_CACHE_DIR to a folder that can be written"
+        advice = f"set {folders.SETTING} to a folder that can be written"
         return noted("numba", f"{place}: {error.strerror}: nothing compiled can be kept", advice)
-    return ok("numba", f"{numba.__version__}, nothing compiled yet: the first start takes a minute")
+    return ok("numba", f"{version}, nothing compiled yet: the first start takes a minute")
 
 
 def _installed(name: str) -> str | None:
