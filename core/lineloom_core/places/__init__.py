@@ -9,6 +9,7 @@ from lineloom_core.places.place import (
     conflicting_points,
     count_points,
     count_steady,
+    count_steady_each_way,
     share_explained,
 )
 from lineloom_core.places.recognition import (
@@ -35,6 +36,7 @@ __all__ = [
     "conflicting_points",
     "count_points",
     "count_steady",
+    "count_steady_each_way",
     "evidence_elsewhere",
     "evidence_of",
     "hypotheses",

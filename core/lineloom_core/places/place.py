@@ -227,8 +227,20 @@ def count_steady(reference: Place, current: Place, T_reference_current: Pose) ->
     stood still for one robot and was not there for the other. Two views of one room differ by a
     door or a chair; two rooms that look alike differ by all that stands in them.
     """
+    current_in, reference_in = count_steady_each_way(reference, current, T_reference_current)
+    return current_in[0] + reference_in[0], current_in[1] + reference_in[1]
+
+
+def count_steady_each_way(
+    reference: Place, current: Place, T_reference_current: Pose
+) -> tuple[tuple[int, int], tuple[int, int]]:
+    """`count_steady` of the current place's points in the reference, and the other way round."""
     there, here = _both_tallies(reference, current, T_reference_current)
-    hits, misses = np.concatenate([there[current.steady], here[reference.steady]]).T
+    return _seen_and_gone(there[current.steady]), _seen_and_gone(here[reference.steady])
+
+
+def _seen_and_gone(tally: NDArray[np.float64]) -> tuple[int, int]:
+    hits, misses = tally.T
     matched = np.count_nonzero((hits > 0) & (hits >= misses))
     return int(matched), int(np.count_nonzero((misses >= 2) & (misses >= 3 * hits)))
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
+import numpy as np
 import pytest
-from lineloom_core.mapping.answers.site_view import SiteView
+from lineloom_core.mapping.answers.site_view import KeyframeView, SiteView
 from lineloom_core.mapping.site_mapper import SiteMapper
+from lineloom_lab.evaluation import trajectory_error
 from lineloom_lab.simulation import (
+    Fleet,
     Lidar,
     SimulatedRobot,
     SimulatedScan,
@@ -44,6 +47,12 @@ def back_home(room: int) -> Stops:
     """Out of a room, along the aisle, and the way of before again."""
     stops = (before_door(room), (BAY * 6, AISLE), (BAY * 2, AISLE), inside(2), before_door(2))
     return (*stops, inside(1))
+
+
+INTO_A_CORNER = (inside(1, 2.0), before_door(1), inside(1, 1.8), inside(1, 3.9))
+"""Out of a room and back into it, to stand before the corner that it has like all others."""
+OUT_S = 18.0
+"""Seconds that a robot drives on after it was carried: round, out of the room, along the aisle."""
 
 
 def drive(
@@ -86,6 +95,17 @@ def carried(
     return one_after_the_other(first, second, pause_s=pause_s, session=session), len(first)
 
 
+def carried_from_a_corner(seed: int, lidar: Lidar, room: int) -> tuple[list[SimulatedScan], int]:
+    """As `carried`, on short ways: it stood before a corner, and what it saw there tells little."""
+    world = rooms_in_a_row(seed).world
+    first = drive(world, INTO_A_CORNER, lidar, seed)
+    last = first[-1].true_pose
+    out = ((last.x + BAY * (room - 1), last.y), before_door(room), (BAY * 4, AISLE))
+    second = drive(world, out, lidar, seed + 7, heading=last.theta)
+    second = second[: round(OUT_S * lidar.rate_hz)]
+    return one_after_the_other(first, second, pause_s=0.2), len(first)
+
+
 @dataclass
 class Mapped:
     """What became of a robot's scans."""
@@ -98,6 +118,19 @@ class Mapped:
         """Greatest error [m] in any component after a rigid alignment of its own."""
         tracked = {c for t in self.view.trajectories.values() for c in t.component if c}
         return max(component_error(self.view, scans, c).max for c in tracked)
+
+    def worst_keyframe(self, scans: list[SimulatedScan]) -> float:
+        """The same of keyframes alone, which the map is made of."""
+        true = {s.scan.seq: s.true_pose.to_array() for s in scans}
+        rows: dict[str, list[KeyframeView]] = {}
+        for k in self.view.keyframes:
+            rows.setdefault(k.component, []).append(k)
+        return max(
+            trajectory_error(
+                np.array([k.pose.to_array() for k in of]), np.array([true[k.seq] for k in of])
+            ).max
+            for of in rows.values()
+        )
 
 
 def play(scans: list[SimulatedScan]) -> Mapped:
@@ -143,37 +176,79 @@ def test_it_starts_anew_and_is_known_again(
     assert across == []
 
 
-@pytest.mark.parametrize(
-    ("seed", "lidar", "room"),
-    [
-        (0, sick_lms200(), 2),
-        (0, scanner_360(), 2),
-        (1, scanner_360(), 3),
-        (2, sick_lms200(), 3),
-    ],
-    ids=str,
-)
-def test_a_jump_between_two_scans_is_seen(seed: int, lidar: Lidar, room: int) -> None:
-    scans, cut = carried(rooms_in_a_row(seed).world, lidar, room, seed)
-    mapped = play(scans)
-    assert len(mapped.started) == 2
-    assert cut < mapped.started[1] < cut + 5
-    assert mapped.worst(scans) < OFF
+@dataclass
+class Jumps:
+    """How many robots were carried and what became of them."""
+
+    seen: int = 0
+    """A new track began within five scans."""
+    cut: int = 0
+    """The scan fitted; what came after told, and the track was cut at that step."""
+    wrong: list[str] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        total = self.seen + self.cut + len(self.wrong)
+        return f"of {total} jumps {self.seen} seen, {self.cut} cut later, wrong: {self.wrong}"
 
 
-def test_a_jump_that_went_unseen_is_cut_by_what_comes_after() -> None:
-    # Half the view is a corner that both rooms have alike: the second scan fits, 0.3 m aside.
-    scans, at = carried(rooms_in_a_row(2).world, sick_lms200(), 0, 2)
-    mapped = play(scans)
-    assert mapped.started == [0], "the drive is no test: the jump was seen at once"
+def judge_jumps(seeds: Sequence[int], lidar: Lidar, rooms: Sequence[int]) -> Jumps:
+    """Carry one robot in every building and room, and say what became of it."""
+    jumps = Jumps()
+    for seed in seeds:
+        for room in rooms:
+            scans, at = carried_from_a_corner(seed, lidar, room)
+            mapped = play(scans)
+            apart = any(at <= n < at + 5 for n in mapped.started)
+            off = mapped.worst_keyframe(scans)
+            if off >= OFF or not (apart or is_cut_at(mapped, at)):
+                jumps.wrong.append(f"building {seed}, room {room}: {off:.2f} m off")
+            elif apart:
+                jumps.seen += 1
+            else:
+                jumps.cut += 1
+    return jumps
+
+
+def is_cut_at(mapped: Mapped, at: int) -> bool:
+    """Whether the one thing withdrawn is the step over scan `at`, for that reason."""
     rows = {c.id: c for c in mapped.view.constraints}
-    assert len(mapped.withdrawn) == 1
-    cut = rows[mapped.withdrawn[0]]
-    assert (cut.kind, cut.state) == ("sequential", "retracted")
-    assert "jumped here" in cut.reason
     seq = {k.id: k.seq for k in mapped.view.keyframes}
-    assert at - 10 <= seq[cut.keyframe_b] <= at + 10
-    assert mapped.worst(scans) < OFF
+    found = [rows[name] for name in mapped.withdrawn]
+    return (
+        [(c.kind, c.state) for c in found] == [("sequential", "retracted")]
+        and "jumped here" in found[0].reason
+        and at - 10 <= seq[found[0].keyframe_b] <= at + 10
+    )
+
+
+def test_a_jump_is_seen_at_once_or_cut_by_what_comes_after() -> None:
+    # Half the view is a corner that all rooms have alike: often the second scan fits as well. One
+    # in twenty may go by: furniture is drawn at random, and two rooms may come out much alike.
+    jumps = judge_jumps(range(20), sick_lms200(), [0])
+    print(jumps)
+    assert jumps.cut >= 8, f"the drives are no test: {jumps}"
+    assert len(jumps.wrong) <= 1, str(jumps)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("lidar", [sick_lms200(), scanner_360()], ids=["sick", "360"])
+def test_of_many_jumps_hardly_any_goes_by(lidar: Lidar) -> None:
+    jumps = judge_jumps(range(20, 40), lidar, [0, 2, 3])
+    print(jumps)
+    assert len(jumps.wrong) <= 3, str(jumps)
+
+
+def test_no_step_of_a_drive_among_people_is_taken_for_a_jump() -> None:
+    # None may: a right drive that is cut loses what it knew, and no operator would know why.
+    cut: list[str] = []
+    for seed in range(20):
+        fleet = Fleet.touring(
+            rooms_in_a_row(seed).world, robots=1, seed=seed, duration_s=30.0, lidar=sick_lms200(),
+            people=4,
+        )  # fmt: skip
+        cut += [f"building {seed}: {c}" for c in play(list(fleet.scans())).withdrawn]
+    print(f"of 20 drives among people {len(cut)} were cut: {cut}")
+    assert cut == []
 
 
 @LIDARS

@@ -114,7 +114,7 @@ class Tracker:
             return _nowhere(status, found.fit, conflict)
         self._misses = 0
         self._accept(found.pose, stamp, odometry)
-        moved_on = self._moved_on(found)
+        moved_on = self._moved_on(found, conflict)
         if moved_on:
             self._measure_noise(cloud, found.pose)
             self._add_keyframe(features, cloud)
@@ -123,13 +123,14 @@ class Tracker:
             "tracked", found.pose, moved_on, information, found.fit, conflict, self._noise.value
         )
 
-    def _moved_on(self, found: Registration) -> bool:
+    def _moved_on(self, found: Registration, conflict: float) -> bool:
         """Whether the scan is to be a keyframe."""
         config, step = self._config, self._recent.latest[1].between(found.pose)
         return (
             math.hypot(step.x, step.y) > config.keyframe_distance
             or abs(step.theta) > config.keyframe_angle
             or found.fit < config.enough_fit
+            or conflict > config.new_conflict
         )
 
     def _is_hope(self, found: Registration, conflict: float, elapsed: float) -> bool:

@@ -1,74 +1,82 @@
 """A robot carried elsewhere between two scans, into a place that looks alike.
 
 Tracking follows walls, and equal rooms have the same: the scan after a kidnapping may fit the map
-before it. What stands in the rooms differs. So the places along one track are held against each
-other, two on, where they still see the same: if what stood still is gone, twice running, the robot
-has jumped in between, and the step at which it did so is named.
+before it. What stands in the rooms differs. So the scan at which a robot jumped contradicts the
+free space of the keyframe before, if not enough to be refused; and once the robot has driven on,
+what stood still just before that step is gone after it, and what stands after it was not there
+before. Whoever stood about and walked off is missing one way only.
+
+Both sides of a step are held against each other whole. Places, which are made every few metres,
+would straddle the jump: how much each shows of either side is chance, and so would be the verdict.
 """
 
 from __future__ import annotations
 
+import math
+
 from lineloom_core.mapping.belief.constraint import Constraint, step_id
 from lineloom_core.mapping.belief.place_making import make_place
 from lineloom_core.mapping.belief.site_map import SiteMap
-from lineloom_core.mapping.merging.overlap import Count, count_steady_nearby
-from lineloom_core.places import Place, count_steady, missing_share
+from lineloom_core.mapping.belief.track import Track
+from lineloom_core.places import Place, count_steady_each_way, missing_share
 
 _MEMBERS = 8  # keyframes on either side of a step that are held against each other
+_LEAST_BEFORE = 4
+_BESIDE = 2  # steps on either side that a suspect stands out from
 
 
 def jump(site: SiteMap, place: Place) -> Constraint | None:
-    """The step at which a track jumped, if its last four places, `place` the last, say so."""
+    """The step at which a track jumped, if what was driven up to `place` says so."""
     config = site.config.doubt
     track = site.track(place.anchor)
-    last = _last_places(site, place)
-    if len(last) < 4:
-        return None
-    counts = [_held_together(site, last[0], last[2]), _held_together(site, last[1], last[3])]
-    matched, missing = (sum(c[i] for c in counts) for i in (0, 1))
-    share = missing_share(matched, missing)
-    if matched + missing < config.jump_points or share < config.jump_missing:
-        return None
-    if min(missing_share(*c) for c in counts) <= config.place_right:
-        return None  # somebody stood in one of them
-    steps = [
-        k
-        for k in track.keyframes
-        if last[1].keyframes[0] < k <= last[2].keyframes[-1]
-        and step_id(k) not in site.verdicts.approved
-        and step_id(k) in site.constraints
-    ]
-    if not steps:
-        return None
-    worst = max(steps, key=lambda k: (_missing_across(site, k), -k))
-    reason = f"withdrawn: the robot jumped here, {share:.1%} of what stood still is gone"
-    return site.constraints[step_id(worst)].moved_to("retracted", reason, site.now)
+    for at in _suspects(site, track, place):
+        ways = _each_way(site, track, at)
+        if min(map(sum, ways)) < config.jump_points:
+            continue
+        share = math.sqrt(math.prod(missing_share(*way) for way in ways))
+        if share >= config.jump_missing:
+            reason = f"withdrawn: the robot jumped here, {share:.1%} of what stood still is gone"
+            step = site.constraints[step_id(track.keyframes[at])]
+            return step.moved_to("retracted", reason, site.now)
+    return None
 
 
-def _last_places(site: SiteMap, place: Place) -> list[Place]:
-    """The last four places of a track, oldest first."""
-    track = site.track(place.anchor)
-    numbers = [p for p in track.places if p <= place.id][-4:]
-    return [site.places[p] for p in numbers]
+def _suspects(site: SiteMap, track: Track, place: Place) -> list[int]:
+    """Positions of steps that contradict the keyframe before, more than those beside them do.
+
+    Of all that now have enough keyframes after them, and had not when the last place was made:
+    each step is judged once.
+    """
+    earlier = [p for p in track.places if p < place.id]
+    begin = track.position(earlier[-1]) + 1 if earlier else 0
+    end = track.position(place.id) + 1
+    found = []
+    for at in range(max(begin - _MEMBERS + 1, _LEAST_BEFORE), end - _MEMBERS + 1):
+        around = [_conflict(site, k) for k in track.keyframes[at - _BESIDE : at + _BESIDE + 1]]
+        conflict = around[_BESIDE]
+        if conflict >= site.config.doubt.jump_conflict and conflict == max(around):
+            found.append(at)
+    return found
 
 
-def _held_together(site: SiteMap, before: Place, after: Place) -> Count:
-    T = site.pose(before.anchor).between(site.pose(after.anchor))
-    return count_steady_nearby(before, after, T)
+def _conflict(site: SiteMap, keyframe: int) -> float:
+    """Share of a keyframe's scan that lies in what the one before saw as free, by its step."""
+    step = site.constraints.get(step_id(keyframe))
+    if step is None or step.id in site.verdicts.approved:
+        return 0.0
+    return step.checks.get("conflict_share", 0.0)
 
 
-def _missing_across(site: SiteMap, keyframe: int) -> float:
-    """Share of what stood still that is gone from one side of a keyframe's step to the other."""
-    track = site.track(keyframe)
-    at = track.position(keyframe)
+def _each_way(site: SiteMap, track: Track, at: int) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Steady points seen again across a step, and gone there: those after it, those before it."""
     before, after = (
         make_place(members, site.keyframes)
         for members in (
             track.keyframes[max(at - _MEMBERS, 0) : at],
-            track.keyframes[at:][:_MEMBERS],
+            track.keyframes[at : at + _MEMBERS],
         )
     )
     T = site.keyframes[before.anchor].T_track_laser.between(
         site.keyframes[after.anchor].T_track_laser
     )
-    return missing_share(*count_steady(before, after, T))
+    return count_steady_each_way(before, after, T)
