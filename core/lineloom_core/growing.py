@@ -8,9 +8,12 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
+
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
 
+@storable("growing-array", rows=NDArray[Any])
 class GrowingArray(Generic[_Scalar]):
     """Rows of one shape, at the price of a list: room is doubled when it runs out."""
 
@@ -40,7 +43,7 @@ class GrowingArray(Generic[_Scalar]):
         return self._room[: self._count]
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"_room": self.rows.copy(), "_count": self._count}
+        return {"rows": self.rows}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
+        self._room, self._count = state["rows"], len(state["rows"])

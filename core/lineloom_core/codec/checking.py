@@ -92,7 +92,8 @@ def check_of(annotation: Any) -> Check:
 def _inside(kind: Any, args: tuple[Any, ...]) -> Callable[[Any], bool] | None:
     """What the elements must be; None where nothing is said of them."""
     if kind is np.ndarray:
-        scalars = tuple(s for s in get_args(args[-1]) if isinstance(s, type)) if args else ()
+        said = get_args(args[-1]) if args else ()
+        scalars = tuple(s for s in said if isinstance(s, type) and s is not Any)
         return (lambda array: issubclass(array.dtype.type, scalars)) if scalars else None
     if kind is tuple and args and args[-1] is not Ellipsis:
         return partial(_fits_each, [check_of(arg) for arg in args])

@@ -6,7 +6,7 @@ import zlib
 from collections import deque
 from collections.abc import Callable, Mapping
 from functools import lru_cache
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar, overload
 
 import msgpack
 import numpy as np
@@ -24,8 +24,16 @@ MOST_INFLATED = 1 << 31
 """Bytes that anything of ours is smaller than."""
 
 
-def decode(data: bytes, expected: type[_T], outside: Finders | None = None) -> _T:
-    """Return what was encoded, an `expected` (any annotation that is no union).
+@overload
+def decode(data: bytes, expected: type[_T], outside: Finders | None = None) -> _T: ...
+
+
+@overload
+def decode(data: bytes, expected: object, outside: Finders | None = None) -> Any: ...
+
+
+def decode(data: bytes, expected: Any, outside: Finders | None = None) -> Any:
+    """Return what was encoded, an `expected`: a class or another annotation.
 
     Raises CodecError for anything else, whatever the bytes say, naming the class and the field.
     """
@@ -38,7 +46,7 @@ def decode(data: bytes, expected: type[_T], outside: Finders | None = None) -> _
         raise CodecError(f"no message: {type(error).__name__}: {error}") from error
     if not _expecting(expected).fits(value):
         raise CodecError(f"a {type(value).__name__} instead of {expected}")
-    return cast(_T, value)
+    return value
 
 
 def inflate(data: bytes, most: int = MOST_INFLATED) -> bytes:

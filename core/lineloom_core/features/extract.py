@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.features import _circle_kernels, _kernels
 from lineloom_core.parameters import parameter
 from lineloom_core.scan import Scan
@@ -16,6 +17,7 @@ CHORD_REACH = 0.09
 """How far off a circle [m] the ends and middle of its chords lie: the split threshold and noise."""
 
 
+@storable("extraction-config", shared=True)
 @dataclass(frozen=True, slots=True)
 class ExtractionConfig:
     """Line segments, corners and circles of a scan (thesis chapter 3)."""
@@ -44,6 +46,7 @@ class ExtractionConfig:
     min_circle_points: int = parameter(7, "points", "fewest of a circle", 3)
 
 
+@storable("scan-features")
 @dataclass(frozen=True, eq=False)
 class ScanFeatures:
     """What a scan shows, in the laser's frame; n lines in counter-clockwise order (Table 3.1).

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.fusion import _kernels as kernels
 from lineloom_core.fusion.segment_map import LineObservations
 from lineloom_core.parameters import parameter
@@ -16,6 +17,7 @@ _LEAST_SIGMA_M = 1e-3  # no lidar line is better known than that; keeps weights 
 _MAX_ROUNDS = 8
 
 
+@storable("fusion-config")
 @dataclass(frozen=True, slots=True)
 class FusionConfig:
     """When two segments are one wall, and which walls are kept."""

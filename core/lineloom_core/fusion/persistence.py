@@ -16,11 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.fusion import _persistence_kernels as kernels
 from lineloom_core.fusion.occupancy import Rays
 from lineloom_core.parameters import parameter
 
 
+@storable("persistence-config")
 @dataclass(frozen=True, slots=True)
 class PersistenceConfig:
     """When a wall that is seen through leaves the map."""

@@ -9,15 +9,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.geometry import Pose, se2
-from lineloom_core.graph.edge import Edge
+from lineloom_core.graph.edge import Edge, EdgeKind
 from lineloom_core.graph.piece import Piece, labels
 from lineloom_core.graph.pose_table import PoseTable
 from lineloom_core.growing import GrowingArray
 
 
+@storable(
+    "pose-graph",
+    ids=NDArray[np.int64],
+    poses=NDArray[np.float64],
+    labels=NDArray[np.int64],
+    names=list[str],
+    kinds=list[EdgeKind],
+    ends=NDArray[np.int64],
+    measured=NDArray[np.float64],
+    information=NDArray[np.float64],
+    robust=NDArray[np.bool_],
+    changes=int,
+)
 class PoseGraph:
-    """Nodes with poses and edges with measurements, as objects and as arrays; made to be pickled.
+    """Nodes with poses and edges with measurements, as objects and as arrays; made to be stored.
 
     Node poses live in the frame of their component. All that the solver takes is kept in arrays
     while the graph grows and shrinks. Solving is `solver.settle`'s business.
@@ -35,13 +49,40 @@ class PoseGraph:
         """Grows with every change; the same number means the same graph."""
 
     def __getstate__(self) -> dict[str, Any]:
-        """Edges are kept as objects: the arrays follow from them."""
-        derived = ("_edges_at", "_ends", "_measured", "_information", "_robust")
-        return {k: v for k, v in self.__dict__.items() if k not in derived}
+        """Edges follow from the arrays, their ids and kinds."""
+        return {
+            "ids": self._ids.rows,
+            "poses": self._poses.rows,
+            "labels": self._labels.rows,
+            "names": list(self._edges),
+            "kinds": [edge.kind for edge in self._edges.values()],
+            "ends": self._ends.rows,
+            "measured": self._measured.rows,
+            "information": self._information.rows,
+            "robust": self._robust.rows,
+            "changes": self.changes,
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        self._list_edges()
+        """Raises ValueError where the arrays do not fit each other."""
+        self.__init__()  # type: ignore[misc]
+        ids = state["ids"].tolist()
+        for node, pose in zip(ids, state["poses"].tolist(), strict=True):
+            self.add_node(node, Pose(*pose))
+        columns = (
+            state["names"],
+            state["kinds"],
+            state["ends"].tolist(),
+            state["measured"].tolist(),
+            state["information"],
+            state["robust"].tolist(),
+        )
+        for name, kind, (a, b), measured, information, robust in zip(*columns, strict=True):
+            edge = Edge(name, kind, ids[a], ids[b], Pose(*measured), information.copy(), robust)
+            self._edges[name] = edge
+            self._list_edge(edge)
+        self._labels.rows[:] = state["labels"]
+        self.changes = state["changes"]
 
     @property
     def nodes(self) -> Mapping[int, Pose]:
@@ -202,11 +243,6 @@ class PoseGraph:
     def _relabel(self) -> None:
         self._labels.rows[:] = labels(self._ids.rows, self._ends.rows)
         self.changes += 1
-
-    def _list_edges(self) -> None:
-        self._clear_edges()
-        for edge in self._edges.values():
-            self._list_edge(edge)
 
     def _list_edge(self, edge: Edge) -> None:
         self._edges_at[edge.node_a].append(edge)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.health.finding import Finding
 from lineloom_core.health.sample import Sample
 
@@ -27,6 +28,7 @@ _LEAST_HIT_BEAMS = 2
 _LEAST_BLOCKED_RAD = math.radians(4.0)
 
 
+@storable("beam-stretch")
 @dataclass
 class _Stretch:
     """Counts over one stretch of way, per beam; n beams."""
@@ -80,6 +82,7 @@ class _Stretch:
         )
 
 
+@storable("beam-check")
 @dataclass
 class BeamCheck:
     """Judges stretch after stretch; what was found holds until the next one is judged."""

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.features import ScanFeatures
 from lineloom_core.features._circle_kernels import ARC, RADIUS, SENSE
 from lineloom_core.features._kernels import FIRST, LAST, LENGTH, OFFSET, THETA
@@ -40,6 +41,7 @@ _MOST_SPREAD = 0.5
 _LEAST_ROUND_M, _LEAST_ROUND_ARC, _ROUND_SHARE, _ROUND_SPREAD = 1.0, 0.5, 0.3, 0.05
 
 
+@storable("bending-check")
 @dataclass
 class BendingCheck:
     """The last scans: rows epsilon, leverage [m^2], turn rate [rad/s]; radii of round walls [m]."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.health.finding import Finding
 from lineloom_core.health.sample import Sample
 
@@ -18,6 +19,7 @@ _FROZEN_SCANS = 10
 _LEAST_RETURNS = 30
 
 
+@storable("clock-check")
 @dataclass
 class ClockCheck:
     """Time steps of zero or less among the last hundred; single ones occur in sound logs."""
@@ -51,6 +53,7 @@ class ClockCheck:
         ]
 
 
+@storable("frozen-check")
 @dataclass
 class FrozenCheck:
     """Scans in a row that equal each other in every beam: no lidar measures without noise."""

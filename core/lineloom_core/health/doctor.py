@@ -15,6 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
+from lineloom_core.codec import storable
 from lineloom_core.features import ScanFeatures
 from lineloom_core.geometry import Pose
 from lineloom_core.health.beams import BeamCheck
@@ -38,9 +39,10 @@ class Check(Protocol):
         ...
 
 
+@storable("sensor-doctor")
 @dataclass
 class SensorDoctor:
-    """The state of all checks: deterministic, picklable, a few kilobytes."""
+    """The state of all checks: deterministic, storable, a few kilobytes."""
 
     units: UnitsCheck = field(default_factory=UnitsCheck)
     clock: ClockCheck = field(default_factory=ClockCheck)

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from lineloom_core.codec import storable
 from lineloom_core.health.finding import Finding
 from lineloom_core.health.sample import Sample
 
@@ -22,6 +23,7 @@ _FORGET = 0.995
 _MOST_SCALE = 1.3
 
 
+@storable("turning-check")
 @dataclass
 class TurningCheck:
     """Sums of |wheels' turn|, and of it with the sign of whether the scans turned likewise.

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lineloom_core.codec import storable
 from lineloom_core.health.finding import Finding
 from lineloom_core.health.sample import Sample
 
@@ -16,6 +17,7 @@ _NEAR_M = 0.2
 _BLIND_SHARE = 0.02
 
 
+@storable("units-check")
 @dataclass
 class UnitsCheck:
     """Counts scans in a row that are too large, too small or empty. No room measures 100 m across

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from lineloom_core.codec import storable
 from lineloom_core.features import ExtractionConfig
 from lineloom_core.fusion import FusionConfig
 from lineloom_core.fusion.persistence import PersistenceConfig
@@ -14,6 +15,7 @@ from lineloom_core.parameters import ParameterError, parameter, with_values
 from lineloom_core.places.recognition import RecognitionConfig
 
 
+@storable("tracker-config")
 @dataclass(frozen=True, slots=True)
 class TrackerConfig:
     """Following a robot from scan to scan.
@@ -68,6 +70,7 @@ class TrackerConfig:
     )
 
 
+@storable("place-config")
 @dataclass(frozen=True, slots=True)
 class PlaceConfig:
     """Places: the submaps that are recognised."""
@@ -79,6 +82,7 @@ class PlaceConfig:
     shortlist: int = parameter(48, "places", "the likeliest, where more are worth trying", 1)
 
 
+@storable("near-loop-config")
 @dataclass(frozen=True, slots=True)
 class NearLoopConfig:
     """Closing loops where the graph already knows that two keyframes are near each other."""
@@ -93,6 +97,7 @@ class NearLoopConfig:
     every: int = parameter(2, "keyframes", "from one that is looked at to the next", 1)
 
 
+@storable("join-config")
 @dataclass(frozen=True, slots=True)
 class JoinConfig:
     """Believing a set of candidate constraints, which joins two components."""
@@ -126,6 +131,7 @@ class JoinConfig:
     most_candidates: int = parameter(64, "constraints", "that sets are made of", 1, 4096)
 
 
+@storable("doubt-config")
 @dataclass(frozen=True, slots=True)
 class DoubtConfig:
     """When what was believed is withdrawn.
@@ -162,6 +168,7 @@ class DoubtConfig:
     jump_points: int = parameter(40, "points", "each way, that a jump is judged by", 1)
 
 
+@storable("thinning-config")
 @dataclass(frozen=True, slots=True)
 class ThinningConfig:
     """When places and their keyframes are let go."""
@@ -174,6 +181,7 @@ class ThinningConfig:
     )
 
 
+@storable("localise-config")
 @dataclass(frozen=True, slots=True)
 class LocaliseConfig:
     """Finding where a scan was taken (`localise`); it changes no map."""
@@ -201,6 +209,7 @@ class LocaliseConfig:
     least_score: float = parameter(0.9, "share", "how sure a unique answer must be")
 
 
+@storable("mapper-config")
 @dataclass(frozen=True, slots=True)
 class MapperConfig:
     """Parameters of `SiteMapper`; the defaults are those that every figure was measured with."""

@@ -12,10 +12,10 @@ No clock, no randomness, no I/O: the same log gives the same bits, also across `
 
 from __future__ import annotations
 
-import pickle
 from collections.abc import Sequence
 from dataclasses import replace
 
+from lineloom_core.codec import decode, encode
 from lineloom_core.fusion.occupancy import Rays
 from lineloom_core.mapping.advance import advance, contradicted_by_next
 from lineloom_core.mapping.answers.evidence import Action, Evidence, WhatIf
@@ -42,6 +42,9 @@ from lineloom_core.mapping.facts.keyframe import Keyframe
 from lineloom_core.mapping.facts.robot_record import RobotRecord
 from lineloom_core.mapping.snapshot import Snapshot, SnapshotError
 from lineloom_core.scan import Mount, Scan
+
+_State = tuple[str, MapperConfig, bytes, bytes]
+_Beliefs = tuple[SiteMap, dict[str, RobotRecord], int]
 
 
 class SiteMapper:
@@ -175,20 +178,21 @@ class SiteMapper:
 
     def snapshot(self, known: int = 0) -> Snapshot:
         """The whole state, for `resume`, without the first `known` chapters of the history."""
-        known_now = (self._site, self._robots, self._version)
-        beliefs = dumps(known_now, self._memory, self._config)
-        state = (digest(self._config), self._config, self._history, self._memory, beliefs)
-        return Snapshot(pickle.dumps(state, protocol=5), known, self._history.chapters(known))
+        facts = encode((self._history, self._memory))
+        beliefs = dumps((self._site, self._robots, self._version))
+        state = encode((digest(self._config), self._config, facts, beliefs))
+        return Snapshot(state, known, self._history.chapters(known))
 
     @classmethod
     def resume(cls, snapshot: Snapshot) -> SiteMapper:
         """Go on from a whole snapshot. Raises SnapshotError where it cannot be read."""
         try:
-            made, config, history, memory, beliefs = pickle.loads(snapshot.state)
+            made, config, facts, beliefs = decode(snapshot.state, _State)
             if made != digest(config):
                 raise SnapshotError(f"made by {made}, which is not {digest(config)}")
+            history, memory = decode(facts, tuple[History, Memory])
             history.bind(snapshot.chapters if snapshot.first == 0 else ())
-            site, robots, version = loads(beliefs, history, memory, config)
+            site, robots, version = loads(beliefs, _Beliefs, history, memory, config)
         except SnapshotError:
             raise
         except Exception as error:

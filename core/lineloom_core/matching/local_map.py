@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.features import ScanFeatures
 from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.matching import _registration_kernels as _kernels
@@ -19,6 +20,7 @@ _HALF_HOLD = np.diag([25.0, 25.0, 100.0])
 """Information that keeps the covariance of half a scan finite where it observes nothing."""
 
 
+@storable("cloud")
 @dataclass(frozen=True, eq=False)
 class Cloud:
     """A scan's points as registration wants them.

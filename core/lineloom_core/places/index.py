@@ -8,7 +8,6 @@ line. That ranks; `recognise` decides. A place that is missed costs time, never 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,13 +33,6 @@ class PlaceIndex:
 
     def __len__(self) -> int:
         return len(self._slots)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Had again from the places as needed."""
-        return {}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__init__()  # type: ignore[misc]
 
     def add(self, place: Place) -> int:
         """Take a place in unless one of its id and keyframes is known; return its number."""

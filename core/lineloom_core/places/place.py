@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,10 +98,6 @@ class Place:
     track: int
     anchor: int
     glimpses: tuple[Glimpse, ...]
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Without what can be made again."""
-        return {f.name: self.__dict__[f.name] for f in fields(self)}
 
     @property
     def keyframes(self) -> tuple[int, ...]:

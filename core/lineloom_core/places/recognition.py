@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.graph.observability import observe
 from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
@@ -22,6 +23,7 @@ from lineloom_core.places.place import Place, count_points, count_steady
 from lineloom_core.timing import timed
 
 
+@storable("recognition-config")
 @dataclass(frozen=True, slots=True)
 class RecognitionConfig:
     """When two places are the same."""
@@ -56,6 +58,7 @@ class RecognitionConfig:
     rival_angle: float = parameter(0.15, "rad", "from which on a hypothesis is a rival")
 
 
+@storable("recognition")
 @dataclass(frozen=True, eq=False)
 class Recognition:
     """The outcome for a pair of places.

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from lineloom_core.codec import storable
 from lineloom_core.geometry import Pose
 
 
+@storable("mount")
 @dataclass(frozen=True, slots=True)
 class Mount:
     """The laser's pose in the robot's base frame; `inverted` = mounted upside down.

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.geometry import Pose
 
 MAX_BEAMS = 20_000
@@ -25,6 +26,7 @@ class InvalidScanError(ValueError):
         self.reason = reason
 
 
+@storable("scan")
 @dataclass(frozen=True, eq=False)
 class Scan:
     """One sweep. SI units and radians, in the laser's frame (REP-103).

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import gc
-import pickle
 import tempfile
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from lineloom_core.codec import decode, encode
 from lineloom_core.features import ExtractionConfig
 from lineloom_core.geometry import Pose
 from lineloom_core.mapping.belief.memory import Memory
@@ -54,7 +54,7 @@ def bits(keyframe: Keyframe) -> tuple[object, ...]:
     """All that a keyframe is."""
     f, step = keyframe, keyframe.step
     scan = (f.scan.ranges.tobytes(), replace(f.scan, ranges=None).__dict__)  # type: ignore[arg-type]
-    said = None if step is None else (*map(pickle.dumps, step.__dict__.values()),)
+    said = None if step is None else encode(step)
     return f.id, f.robot, f.track, str(scan), f.T_track_laser, said, f.version, f.trusted
 
 
@@ -73,7 +73,7 @@ def all_bits(history: History, begin: int = 0) -> list[tuple[object, ...]]:
 
 def reopened(history: History) -> History:
     """As a snapshot does it."""
-    other: History = pickle.loads(pickle.dumps(history))
+    other = decode(encode(history), History)
     other.bind(history.chapters(0))
     return other
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import pickle
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from lineloom_core.codec import decode, encode
 from lineloom_core.features import extract_features
 from lineloom_core.geometry import Pose
 from lineloom_core.mapping.config import TrackerConfig
@@ -77,12 +77,12 @@ def test_of_a_single_keyframe_nothing_is_known_to_stand_still() -> None:
     assert len(remembered(scans[:1]).steady.surface) == 0
 
 
-def test_a_pickled_memory_has_the_same_maps() -> None:
+def test_a_stored_memory_has_the_same_maps() -> None:
     scans = list(
         robot(rectangle(8.0, 5.0), legs(Pose(2, 2, 0), (2.0, 0.0)), None, SEES_FAR).scans()
     )
     recent = remembered(scans)
-    again = pickle.loads(pickle.dumps(recent))
+    again = decode(encode(recent), Recent)
     for a, b in ((recent.map, again.map), (recent.steady, again.steady)):
         assert a.surface.tobytes() == b.surface.tobytes()
 

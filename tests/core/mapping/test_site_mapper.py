@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lineloom_core.codec import decode, encode
 from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.site_mapper import SiteMapper
@@ -76,6 +77,7 @@ def test_going_on_from_a_snapshot_gives_the_same_bits(
     half = int(share * len(log))
     snapshot = mapped(log[:half]).snapshot()
     resumed = SiteMapper.resume(snapshot)
+    assert resumed.snapshot() == snapshot, "something of the state was lost or came back otherwise"
     feed(resumed, log[half:])
     assert fingerprint(resumed.view()) == fingerprint(whole)
 
@@ -138,12 +140,26 @@ def test_a_resumed_mapper_answers_at_once(log: list[SimulatedScan]) -> None:
     assert fingerprint(resumed.view()) == fingerprint(mapper.view())
 
 
-@pytest.mark.parametrize("data", [b"", b"no pickle", pickle.dumps(("only", "two")), None])
+@pytest.mark.parametrize("data", [b"", b"no message", encode(("only", "two")), None])
 def test_an_unreadable_snapshot_is_named(data: bytes | None) -> None:
     if data is None:  # right shape, another version's format
-        data = pickle.dumps((-1, *pickle.loads(SiteMapper().snapshot().state)[1:]))
+        data = encode((-1, *decode(SiteMapper().snapshot().state, tuple)[1:]))
     with pytest.raises(SnapshotError):
         SiteMapper.resume(Snapshot(data))
+
+
+def test_a_forged_snapshot_is_refused_or_a_map(log: list[SimulatedScan]) -> None:
+    """Whatever was done to its bytes: no other error, and nothing that is not the mapper's."""
+    state, rng = mapped(log[:60]).snapshot().state, np.random.default_rng(3)
+    refused = 0
+    for at in rng.integers(0, len(state), 60).tolist():
+        forged = bytearray(state)
+        forged[at] ^= int(rng.integers(1, 256))
+        try:
+            SiteMapper.resume(Snapshot(bytes(forged)))
+        except SnapshotError:
+            refused += 1
+    assert 0 < refused < 60
 
 
 def test_looking_changes_nothing(log: list[SimulatedScan], whole: SiteView) -> None:

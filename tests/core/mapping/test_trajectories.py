@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import pickle
-
 import numpy as np
 import pytest
+from lineloom_core.codec import decode, encode
 from lineloom_core.geometry import Pose
 from lineloom_core.mapping.answers.trajectories import Trajectories, Way, Whereabouts
 from lineloom_core.mapping.facts.placed_scans import BLOCK, PlacedScan, PlacedScans
@@ -87,7 +86,7 @@ def test_full_blocks_stay_the_same_objects() -> None:
 
 def test_a_snapshot_holds_them_all(placed: dict[str, PlacedScans]) -> None:
     for name, scans in SCANS.items():
-        again: PlacedScans = pickle.loads(pickle.dumps(placed[name]))
+        again = decode(encode(placed[name]), PlacedScans)
         assert len(again) == len(scans)
         seqs = [seq for block in again.blocks() for seq in block.seq.tolist()]
         assert seqs == [s.seq for s in scans]

@@ -80,11 +80,11 @@ class Checkpoints:
         return site, self.history.since(begin)
 
     def _as_bytes(self, site: SiteMap) -> bytes:
-        return zlib.compress(dumps(site, self._memory, self._config), 1)
+        return zlib.compress(dumps(site), 1)
 
     def _from_bytes(self, data: bytes) -> SiteMap:
-        site = loads(zlib.decompress(data), self.history, self._memory, self._config)
-        assert isinstance(site, SiteMap)
+        whole = zlib.decompress(data)  # ours, from the spool
+        site: SiteMap = loads(whole, SiteMap, self.history, self._memory, self._config)
         return site
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.geometry import Pose
 from lineloom_core.graph import Edge
 from lineloom_core.mapping.belief.constraint_state import (
@@ -19,6 +20,7 @@ CONSTRAINT_FLOOR = np.diag([0.05**2, 0.05**2, 0.01**2])
 """How far two right constraints may disagree besides drift."""
 
 
+@storable("constraint")
 @dataclass(frozen=True, eq=False)
 class Constraint:
     """T_a_b between two keyframes and its state.

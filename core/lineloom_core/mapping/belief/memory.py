@@ -7,6 +7,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.geometry import Pose
 from lineloom_core.places import (
     Place,
@@ -33,6 +34,7 @@ class Sealed(Protocol):
         """Those that were asked for when the place was the latest."""
 
 
+@storable("memory", _config=RecognitionConfig, _recognitions=dict[Pair, Recognition])
 class Memory:
     """Places by id, and what came of comparing two of them. A cache: it decides nothing.
 
@@ -49,15 +51,10 @@ class Memory:
         self._hypotheses: dict[Pair, NDArray[np.float64]] = {}
         self._look_alikes: dict[Pair, NDArray[np.float64]] = {}
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __setstate__(self, state: dict[str, Any]) -> None:
         """Recognitions are worth keeping; places and hypotheses are had again as needed."""
-        empty: dict[str, Any] = {
-            "sealed": None,
-            "places": {},
-            "_hypotheses": {},
-            "_look_alikes": {},
-        }
-        return {**self.__dict__, **empty}
+        self.__init__(state["_config"])  # type: ignore[misc]
+        self._recognitions = state["_recognitions"]
 
     def recognise(self, reference: Place, current: Place) -> Recognition:
         """`places.recognise`, asked once per pair."""

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from array import array
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.geometry import Pose
 
 _NOTHING = -1
 _HERE = Pose.identity()
 
 
+@storable("resting", holder=NDArray[np.int64], poses=NDArray[np.float64])
 class Resting:
     """Where they lie. What they rest on may be let go later: they move on with it.
 
@@ -24,6 +27,21 @@ class Resting:
         self._poses = array("d")  # three each
         self._held_by: dict[int, array[int]] = {}
         self._count = 0
+
+    def __getstate__(self) -> dict[str, Any]:
+        poses = np.array(self._poses, dtype=np.float64).reshape(-1, 3)
+        return {"holder": np.array(self._holder, dtype=np.int64), "poses": poses}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        holder, poses = state["holder"], state["poses"]
+        if poses.shape != (len(holder), 3):
+            raise ValueError(f"{len(holder)} keyframes rest, with poses of shape {poses.shape}")
+        self._holder, self._poses = array("q", holder.tobytes()), array("d", poses.tobytes())
+        self._held_by = {}
+        resting = np.flatnonzero(holder != _NOTHING)
+        for keyframe, on in zip(resting.tolist(), holder[resting].tolist(), strict=True):
+            self._held_by.setdefault(on, array("q")).append(keyframe)
+        self._count = len(resting)
 
     def __contains__(self, keyframe: int) -> bool:
         return keyframe < len(self._holder) and self._holder[keyframe] != _NOTHING

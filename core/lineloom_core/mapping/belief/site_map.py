@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.geometry import Pose
 from lineloom_core.graph import PoseGraph, settle
 from lineloom_core.mapping.belief.constraint import Constraint, step_id
@@ -28,6 +29,23 @@ from lineloom_core.mapping.facts.keyframe import Keyframe, Step
 from lineloom_core.places import Place
 
 
+@storable(
+    "site-map",
+    config=MapperConfig,
+    memory=Memory,
+    verdicts=Verdicts,
+    keyframes=dict[int, Keyframe],
+    tracks=dict[str, Track],
+    places=list[tuple[int, ...]],
+    constraints=dict[str, Constraint],
+    graph=PoseGraph,
+    merged_into=dict[str, str],
+    looped_tracks=dict[str, None],
+    unsolved=dict[int, int],
+    overlaps=dict[tuple[str, str], tuple[int, int, int]],
+    now=int,
+    resting=Resting,
+)
 class SiteMap:
     """Grows by one keyframe at a time (`append`); what follows from it is `advance`'s business."""
 
@@ -62,12 +80,15 @@ class SiteMap:
     def __getstate__(self) -> dict[str, Any]:
         """Places are functions of their keyframes and by far the largest part: left out."""
         state = {**self.__dict__, "places": [p.keyframes for p in self.places.values()]}
-        del state["_graph_drift"]
+        for follows in ("_graph_drift", "_track_of", "_latest_track"):
+            del state[follows]
         return state
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self._graph_drift = GraphDrift(self.graph, self.keyframes)
+        self._track_of = {k: track for track in self.tracks.values() for k in track.keyframes}
+        self._latest_track = {track.robot: track for track in self.tracks.values()}
         self.places = {}
         for members in state["places"]:
             self.add_place(members)

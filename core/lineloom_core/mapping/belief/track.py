@@ -10,10 +10,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.geometry import Pose
 from lineloom_core.mapping.facts.drift import Chain
 
 
+@storable("track")
 @dataclass
 class Track:
     """Keyframes that hang together by themselves, in their order.

@@ -9,9 +9,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from lineloom_core.codec import storable
 from lineloom_core.mapping.belief.constraint import Constraint
 
 
+@storable("verdicts")
 @dataclass(frozen=True)
 class Verdicts:
     """retracted: by an operator, withdrawn: by the mapper; both by constraint id, as they were.

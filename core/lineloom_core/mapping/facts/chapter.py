@@ -5,7 +5,6 @@ As bytes it is a fourth of what it takes in memory. Nothing in it ever changes.
 
 from __future__ import annotations
 
-import pickle
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,11 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import CodecError, decode, encode, inflate
 from lineloom_core.mapping.facts.keyframe import Keyframe
 from lineloom_core.places import Recognition
 
 Pair = tuple[int, int]
 
+_Content = tuple[list[Keyframe], list[int], bytes, dict[Pair, Recognition]]
 _NO_RANGES = np.empty(0)
 _LEVEL = 1
 
@@ -34,12 +35,12 @@ class Chapter:
         bare = [replace(f, scan=replace(f.scan, ranges=_NO_RANGES)) for f in self.keyframes]
         lengths, planes = _planes([f.scan.ranges for f in self.keyframes])
         content = (bare, lengths, planes, self.recognitions)
-        return zlib.compress(pickle.dumps(content, protocol=5), _LEVEL)
+        return zlib.compress(encode(content), _LEVEL)
 
     @staticmethod
     def unpack(data: bytes) -> Chapter:
-        """Return what was packed, bit for bit."""
-        bare, lengths, planes, recognitions = pickle.loads(zlib.decompress(data))
+        """Return what was packed, bit for bit. Raises CodecError for anything else."""
+        bare, lengths, planes, recognitions = decode(inflate(data), _Content)
         keyframes = tuple(
             replace(f, scan=replace(f.scan, ranges=ranges))
             for f, ranges in zip(bare, _ranges(lengths, planes), strict=True)
@@ -54,6 +55,8 @@ def _planes(ranges: Sequence[NDArray[np.float64]]) -> tuple[list[int], bytes]:
 
 
 def _ranges(lengths: Sequence[int], planes: bytes) -> list[NDArray[np.float64]]:
+    if min(lengths, default=0) < 0 or 8 * sum(lengths) != len(planes):
+        raise CodecError(f"ranges of {sum(lengths)} beams have {len(planes)} bytes")
     turned = np.frombuffer(planes, dtype=np.uint8).reshape(8, -1).T
     together: NDArray[np.float64] = np.ascontiguousarray(turned).view(np.float64).ravel()
     # Copies: one that stays must not hold all the others.

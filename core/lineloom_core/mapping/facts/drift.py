@@ -17,6 +17,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.geometry import Pose
 from lineloom_core.growing import GrowingArray
 
@@ -31,6 +32,7 @@ _FIRST_GUESS = 2  # keyframes that the first guess of 1 counts for
 _OUTLIER = 5.0  # a single measurement counts for at most so many times the mean
 
 
+@storable("noise-figure", value=float, _count=int)
 class NoiseFigure:
     """Running mean of the disagreement between halves of a robot's scans."""
 
@@ -54,6 +56,12 @@ def step_drift(information: NDArray[np.float64], noise: float) -> NDArray[np.flo
     return np.asarray(np.linalg.inv(seen + _UNSEEN), dtype=np.float64)
 
 
+@storable(
+    "chain",
+    _poses=GrowingArray[np.float64],
+    _sums=GrowingArray[np.float64],
+    _spread=NDArray[np.float64],
+)
 class Chain:
     """Drift along one track: sums of its steps' covariances, so that any stretch is a difference.
 

@@ -19,6 +19,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
+from lineloom_core.codec import storable
 from lineloom_core.mapping.facts.chapter import Chapter
 from lineloom_core.mapping.facts.keyframe import Keyframe
 from lineloom_core.mapping.facts.keyframe_table import KeyframeTable
@@ -32,6 +33,7 @@ _UNPACKED = 2
 """Chapters at hand as objects, for those who read one keyframe after another."""
 
 
+@storable("history", _length=int, _open=bytes, _table=KeyframeTable, _tracks=int, _checks=list[int])
 class History:
     """Keyframes and tracks are numbered in the order they were made; numbers are never reused.
 
@@ -54,8 +56,8 @@ class History:
 
     def __getstate__(self) -> dict[str, Any]:
         """Without chapters: those are saved once (`chapters`) and handed back (`bind`)."""
-        left_out = {"_chapters", "_unpacked", "_held"}
-        state = {k: v for k, v in self.__dict__.items() if k not in left_out}
+        kept = ("_length", "_table", "_tracks", "_checks")
+        state = {name: self.__dict__[name] for name in kept}
         return {**state, "_open": Chapter(tuple(self._open.values()), {}).pack()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.features import ExtractionConfig, ScanFeatures, extract_features
 from lineloom_core.features._kernels import VAR_OFFSET
 from lineloom_core.geometry import Pose
@@ -20,6 +20,7 @@ _DERIVED_KEPT = 2048
 """Keyframes whose features and points stay in memory; another one's are made in 0.1 ms."""
 
 
+@storable("step")
 @dataclass(frozen=True, eq=False)
 class Step:
     """How a keyframe was tracked from the one before it on its track.
@@ -55,6 +56,7 @@ def _worst(a: dict[str, float], b: dict[str, float]) -> dict[str, float]:
     return {name: pick.get(name, max)(a[name], b[name]) for name in a if name in b}
 
 
+@storable("keyframe")
 @dataclass(frozen=True, eq=False)
 class Keyframe:
     """One kept scan.
@@ -84,9 +86,6 @@ class Keyframe:
         """Its lines as the map takes them: ends x1, y1, x2, y2 and sigma [m], shape (n, 5)."""
         lines = self.features.lines
         return np.column_stack([lines[:, :4], np.sqrt(lines[:, VAR_OFFSET])])
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {f.name: self.__dict__[f.name] for f in fields(self)}
 
     @property
     def features(self) -> ScanFeatures:

@@ -5,10 +5,21 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.growing import GrowingArray
 from lineloom_core.mapping.facts.keyframe import Keyframe
 
 
+@storable(
+    "keyframe-table",
+    _names=dict[str, int],
+    _robot=GrowingArray[np.int32],
+    _session=GrowingArray[np.int32],
+    _track=GrowingArray[np.int32],
+    _seq=GrowingArray[np.int64],
+    _gone=GrowingArray[np.bool_],
+    _distrusted=GrowingArray[np.bool_],
+)
 class KeyframeTable:
     """Rows by keyframe id, from 0 on without a gap."""
 

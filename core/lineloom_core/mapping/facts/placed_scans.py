@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.geometry import Pose
 from lineloom_core.growing import GrowingArray
 
@@ -14,6 +15,7 @@ BLOCK = 1024
 """Scans in a block; small enough for the last one to be written again with every view."""
 
 
+@storable("placed-scan")
 @dataclass(frozen=True, slots=True)
 class PlacedScan:
     """A processed scan, fixed to the keyframe it was tracked against."""
@@ -25,6 +27,7 @@ class PlacedScan:
     T_keyframe_laser: Pose
 
 
+@storable("scan-block")
 @dataclass(frozen=True, eq=False, slots=True)
 class ScanBlock:
     """Up to `BLOCK` placed scans one after another, in columns of n; a full one never changes.
@@ -40,6 +43,16 @@ class ScanBlock:
     steps: NDArray[np.float64]
 
 
+@storable(
+    "placed-scans",
+    _full=list[ScanBlock],
+    _names=dict[str, int],
+    _session=GrowingArray[np.int32],
+    _seq=GrowingArray[np.int64],
+    _stamp=GrowingArray[np.float64],
+    _keyframe=GrowingArray[np.int64],
+    _steps=GrowingArray[np.float64],
+)
 class PlacedScans:
     """Columns, not objects: every scan for ever has a row, of 52 bytes."""
 

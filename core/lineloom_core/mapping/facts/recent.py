@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.features import ScanFeatures
 from lineloom_core.geometry import Pose
 from lineloom_core.matching.free_space import seen_by
@@ -24,6 +25,7 @@ from lineloom_core.matching.local_map import Cloud, LocalMap
 _MOST_MISSES = 0.25  # times as often as a steady point was measured it may have been seen through
 
 
+@storable("recent-keyframe")
 @dataclass(eq=False)
 class _Kept:
     """A keyframe in the track's frame; by how many others each point was measured, seen through."""
@@ -49,6 +51,7 @@ class _Kept:
         return still
 
 
+@storable("recent", _compared=int, _kept=deque[_Kept], _depth=int)
 class Recent:
     """Up to `most` keyframes, the latest `compared` of which are held against each other."""
 
@@ -58,12 +61,8 @@ class Recent:
         self._depth = compared
         self._build()
 
-    def __getstate__(self) -> dict[str, Any]:
-        """The maps are a function of the keyframes: left out."""
-        kept = {"map", "steady"}
-        return {k: v for k, v in self.__dict__.items() if k not in kept}
-
     def __setstate__(self, state: dict[str, Any]) -> None:
+        """The maps are a function of the keyframes: they were left out."""
         self.__dict__.update(state)
         self._build()
 

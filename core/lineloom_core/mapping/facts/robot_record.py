@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from lineloom_core.codec import storable
 from lineloom_core.health import SensorDoctor
 from lineloom_core.mapping.facts.placed_scans import PlacedScan, PlacedScans
 from lineloom_core.mapping.facts.robot_state import RobotState
@@ -12,6 +13,7 @@ from lineloom_core.mapping.facts.unplaced_scan import UnplacedScan
 from lineloom_core.scan import Mount, Scan
 
 
+@storable("robot-record")
 @dataclass
 class RobotRecord:
     """Everything about a robot that its next scan depends on."""

@@ -26,6 +26,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.features import ScanFeatures
 from lineloom_core.geometry import Pose
 from lineloom_core.graph import Observability, observe, project_out_weak
@@ -61,6 +62,21 @@ class Tracked:
     """The robot's noise figure so far (see `drift`)."""
 
 
+@storable(
+    "tracker",
+    _config=TrackerConfig,
+    _recent=Recent,
+    _pose=Pose,
+    _twist=NDArray[np.float64],
+    _twist_span=float,
+    _turn_rate=float,
+    _stamp=float,
+    _odometry=Pose | None,
+    _way=deque[tuple[float, Pose]],
+    _misses=int,
+    _noise=NoiseFigure,
+    _wheels=Wheels,
+)
 class Tracker:
     """The state of one track: a local map, the last pose and the last velocity."""
 

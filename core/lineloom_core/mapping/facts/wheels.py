@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 
+from lineloom_core.codec import storable
 from lineloom_core.geometry import Pose, angle_difference
 
 _MOST_CREDIT = 20
@@ -21,6 +22,7 @@ _FASTEST = 3.0  # m/s
 _FASTEST_TURN = 4.0  # rad/s
 
 
+@storable("wheels", _credit=int)
 class Wheels:
     """The credit of one robot's odometry."""
 
