@@ -17,7 +17,7 @@ from lineloom_core.fusion.occupancy import Rays, rasterise
 from lineloom_core.mapping.answers.site_view import SiteView
 from numpy.typing import NDArray
 
-from lineloom_service.store.files import FileRecord
+from lineloom_service.store.files import FileRecord, delete_file, list_files, put_file, read_file
 from lineloom_service.store.protocol import Store
 from lineloom_service.store.records import SiteRecord
 
@@ -61,17 +61,17 @@ class FloorPlans:
         stored = StoredPlan(hashlib.sha256(data).hexdigest(), plan)
         about = json.dumps({"lines": len(plan.lines)})
         file = FileRecord(_NAME, about, stored.sha256, len(data), time.time(), data)
-        await self._store.put_file(site.id, "floorplan", file)
+        await self._store.write(put_file, site.id, "floorplan", file)
         return stored
 
     async def plan(self, site: SiteRecord) -> StoredPlan | None:
         """Return the plan of a site."""
-        files = await self._store.files(site.id, "floorplan")
+        files = await self._store.read(list_files, site.id, "floorplan")
         if not files:
             return None
         known = self._plans.get(site.id)
         if known is None or known.sha256 != files[0].sha256:
-            file = await self._store.read_file(site.id, "floorplan", _NAME)
+            file = await self._store.read(read_file, site.id, "floorplan", _NAME)
             if file is None or file.data is None:
                 return None
             lines = np.frombuffer(file.data, dtype="<f8").reshape(-1, 4)
@@ -81,7 +81,7 @@ class FloorPlans:
     async def remove(self, site: SiteRecord) -> bool:
         """Forget the plan; False where there is none."""
         self._plans.pop(site.id, None)
-        return await self._store.delete_file(site.id, "floorplan", _NAME)
+        return await self._store.write(delete_file, site.id, "floorplan", _NAME)
 
     async def placements(
         self,

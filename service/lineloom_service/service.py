@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from functools import partial
 
 from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_core.mapping.config import MapperConfig
@@ -22,6 +23,7 @@ from lineloom_service.observation.latency import Latency
 from lineloom_service.observation.metrics import Metrics, SiteFigures
 from lineloom_service.pacing import Pacer
 from lineloom_service.security.guard import Guard
+from lineloom_service.security.token_book import read_tokens
 from lineloom_service.settings import Settings
 from lineloom_service.store.choice import database_at
 from lineloom_service.store.protocol import NewsKind, Store
@@ -61,7 +63,7 @@ class Service:
         self.store.subscribe_news(self._on_news)
         self.matcher = PairMatcher()
         self.floorplans = FloorPlans(self.store)
-        self.guard = Guard(self.store.tokens)
+        self.guard = Guard(partial(self.store.read, read_tokens))
         self.metrics = Metrics()
         self._latency = Latency()
         self._sites_seen: list[SiteRecord] = []

@@ -15,6 +15,7 @@ from lineloom import wire
 from lineloom_core.scan import MAX_BEAMS
 from lineloom_service.service import Service
 from lineloom_service.store.codec import decode_scan
+from lineloom_service.store.reads import read_feed
 
 from tests.contract.posting import MSGPACK, Idle, Make, expect_problem, post_scans
 
@@ -24,7 +25,7 @@ pytestmark = pytest.mark.asyncio(loop_scope="module")
 async def _stored(service: Service, site: str) -> list[Any]:
     record = await service.store.site(site)
     assert record is not None
-    entries = await service.store.read_feed(record.id, 0, 10_000)
+    entries = await service.store.read(read_feed, record.id, 0, 10_000)
     return [decode_scan(e.body or b"", e.session or "", e.seq or 0) for e in entries]
 
 

@@ -10,6 +10,7 @@ import httpx
 import pytest
 from lineloom import wire
 from lineloom_service.errors import KINDS
+from lineloom_service.routes import ingest
 from lineloom_service.service import Service
 from lineloom_service.store.records import StoreError
 
@@ -48,15 +49,12 @@ async def test_an_unexpected_failure_shows_nothing_of_itself(
 
 
 async def test_a_failing_storage_is_503_and_nothing_is_taken(
-    client: httpx.AsyncClient,
-    service: Service,
-    make_scan: Make,
-    monkeypatch: pytest.MonkeyPatch,
+    client: httpx.AsyncClient, make_scan: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    async def fail(*_: object, **__: object) -> None:
+    def fail(*_: object, **__: object) -> None:
         raise StoreError("the storage failed: OperationalError")
 
-    monkeypatch.setattr(service.store, "append_scans", fail)
+    monkeypatch.setattr(ingest, "append_scans", fail)
     response = await client.post("/v1/sites/s/robots/r/scans", json=make_scan(0))
     assert response.status_code == 503
     assert response.headers["retry-after"]

@@ -8,7 +8,10 @@ from typing import Any
 
 import httpx
 import pytest
-from lineloom_service.service import Service
+import sqlalchemy as sa
+from lineloom_service.engine import site_runner
+from lineloom_service.store import tables
+from lineloom_service.store.reads import read_feed
 from lineloom_service.store.records import LogEntry, StoreError
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
@@ -27,20 +30,17 @@ async def _until(client: httpx.AsyncClient, done: Callable[[dict[str, Any]], boo
 
 async def test_why_a_site_is_not_mapped(
     client: httpx.AsyncClient,
-    service: Service,
     make_scan: Callable[..., dict[str, Any]],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    read_feed = service.store.read_feed
-
-    async def broken(site_id: int, after: int, limit: int) -> list[LogEntry]:
-        record = await service.store.site("troubled")
-        if record is not None and record.id == site_id:
+    def broken(connection: sa.Connection, site_id: int, after: int, limit: int) -> list[LogEntry]:
+        name = sa.select(tables.sites.c.name).where(tables.sites.c.id == site_id)
+        if connection.execute(name).scalar() == "troubled":
             raise StoreError("the storage failed: DatabaseError")
-        return await read_feed(site_id, after, limit)
+        return read_feed(connection, site_id, after, limit)
 
     with monkeypatch.context() as broken_store:
-        broken_store.setattr(service.store, "read_feed", broken)
+        broken_store.setattr(site_runner, "read_feed", broken)
         for site in ("troubled", "sound"):
             await client.post(f"/v1/sites/{site}/robots/r/scans", json=make_scan(0))
         site = await _until(client, lambda site: site["trouble"] is not None)

@@ -13,6 +13,7 @@ from lineloom_service.engine.conductor import Conductor
 from lineloom_service.engine.local_engine import LocalEngine
 from lineloom_service.observation.durations import Histogram
 from lineloom_service.settings import Settings
+from lineloom_service.store.actions import append_scans
 from lineloom_service.store.choice import database_at
 from lineloom_service.store.codec import encode_scan
 from lineloom_service.store.records import NewScan
@@ -49,7 +50,7 @@ async def _post(store: SqlStore) -> None:
     fleet = Fleet.touring(rooms(2), robots=2, seed=2, duration_s=50.0, lidar=sick_lms200())
     for sample in fleet.scans():
         scan = NewScan(sample.scan.session, sample.scan.seq, encode_scan(sample.scan))
-        await store.append_scans("site", sample.robot, [scan], processed=0, limit=10**9)
+        await store.write(append_scans, "site", sample.robot, [scan], processed=0, limit=10**9)
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ from lineloom_service.engine.conductor import Conductor
 from lineloom_service.engine.local_engine import LocalEngine
 from lineloom_service.engine.published import Published
 from lineloom_service.settings import Settings
+from lineloom_service.store.actions import append_scans
 from lineloom_service.store.choice import database_at
 from lineloom_service.store.codec import encode_scan
 from lineloom_service.store.records import NewScan
@@ -71,7 +72,7 @@ class System:
 
     async def post(self, seqs: range, *, stamps: dict[int, float] | None = None) -> None:
         scans = [new_scan(seq, (stamps or {}).get(seq)) for seq in seqs]
-        await self.store.append_scans("site", "r", scans, processed=0, limit=10**9)
+        await self.store.write(append_scans, "site", "r", scans, processed=0, limit=10**9)
 
     async def published(self) -> Published:
         record = await self.store.site("site")

@@ -20,7 +20,14 @@ from lineloom_service.engine.mapper import apply
 from lineloom_service.engine.protocol import ResumeFailedError, WorkerDiedError
 from lineloom_service.store import tables
 from lineloom_service.store.records import LogEntry, SnapshotRecord, StoreError
+from lineloom_service.store.snapshots import (
+    drop_snapshot,
+    read_chapters,
+    read_snapshot,
+    save_snapshot,
+)
 from lineloom_service.store.sql_store import SqlStore
+from lineloom_service.store.transaction import Transaction
 
 from tests.service.fake_mapper import SEALED, FakeMapper
 from tests.service.system import FAKE, PRODUCER, System, fingerprint, new_scan, running, started
@@ -37,22 +44,21 @@ def _undisturbed(count: int = SCANS) -> FakeMapper:
 
 
 async def _chapters(store: SqlStore) -> tuple[bytes, ...]:
-    snapshot = await store.latest_snapshot(SITE, PRODUCER)
+    snapshot = await store.read(read_snapshot, SITE, PRODUCER)
     if snapshot is None:
         return ()
-    return tuple([chapter async for chapter in store.chapters(SITE, snapshot)])
+    return tuple([chapter async for chapter in read_chapters(store, SITE, snapshot)])
 
 
-def _watched(system: System, monkeypatch: pytest.MonkeyPatch) -> list[SnapshotRecord]:
-    """What the system saves from now on."""
+def _watched(monkeypatch: pytest.MonkeyPatch) -> list[SnapshotRecord]:
+    """What is saved from now on."""
     saved: list[SnapshotRecord] = []
-    save = system.store.save_snapshot
 
-    async def watch(site_id: int, snapshot: SnapshotRecord) -> None:
-        await save(site_id, snapshot)
+    def watch(tx: Transaction, site_id: int, snapshot: SnapshotRecord) -> None:
+        save_snapshot(tx, site_id, snapshot)
         saved.append(snapshot)
 
-    monkeypatch.setattr(system.store, "save_snapshot", watch)
+    monkeypatch.setattr(site_runner, "save_snapshot", watch)
     return saved
 
 
@@ -62,7 +68,7 @@ async def test_every_chapter_is_saved_once(
     saved: list[SnapshotRecord] = []
     for start, end in ((0, 120), (120, SCANS)):  # the second time it goes on from what is there
         async with running(tmp_path, database_url) as system:
-            now = _watched(system, monkeypatch)
+            now = _watched(monkeypatch)
             await system.post(range(start, end))
             await system.caught_up()
         saved += now
@@ -114,7 +120,7 @@ async def test_without_a_chapter_the_map_is_made_from_what_there_is(
         c = tables.chapters.c
         delete, damage = sa.delete(tables.chapters), sa.update(tables.chapters).values(data=b"?")
         how = (delete if harm == "lost" else damage).where(c.number == number)
-        await system.store._write_apart(lambda connection: connection.execute(how))
+        await system.store.write_apart(lambda connection: connection.execute(how))
     undisturbed = _undisturbed(SCANS + 20)
     caplog.set_level(logging.ERROR)
     async with running(tmp_path, database_url) as system:
@@ -137,17 +143,17 @@ async def test_a_snapshot_that_cannot_be_removed_does_not_end_the_mapping(
     monkeypatch.setattr(site_runner, "_AGAIN_S", 0.05)
     async with running(tmp_path, None) as system:
         await _map_and_save(system)
-        await system.store._write_apart(lambda c: c.execute(sa.delete(tables.chapters)))
+        await system.store.write_apart(lambda c: c.execute(sa.delete(tables.chapters)))
     system = System(tmp_path, None)
-    drop, refused = system.store.drop_snapshot, [200, 150]
+    refused = [200, 150]
 
-    async def refuse(site_id: int, position: int) -> None:
+    def refuse(tx: Transaction, site_id: int, position: int) -> None:
         if position in refused:
             refused.remove(position)
             raise StoreError("the storage failed")
-        await drop(site_id, position)
+        drop_snapshot(tx, site_id, position)
 
-    monkeypatch.setattr(system.store, "drop_snapshot", refuse)
+    monkeypatch.setattr(site_runner, "drop_snapshot", refuse)
     async with started(system):
         published = await system.until(lambda p: p.position >= SCANS)
         assert fingerprint(published.view) == fingerprint(_undisturbed().view())
@@ -165,7 +171,7 @@ async def _map_and_save(system: System) -> None:
 async def _saved(system: System, position: int) -> None:
     async with asyncio.timeout(60.0):
         while True:
-            snapshot = await system.store.latest_snapshot(SITE, PRODUCER)
+            snapshot = await system.store.read(read_snapshot, SITE, PRODUCER)
             if snapshot is not None and snapshot.position == position:
                 return
             await asyncio.sleep(0.02)

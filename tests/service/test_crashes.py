@@ -21,6 +21,7 @@ from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_core.warm_up import warm_up
 from lineloom_lab.simulation import Fleet
 from lineloom_service.engine.mapper import SITE_MAPPER, Mapper, apply, load
+from lineloom_service.store.reads import read_feed, read_skips
 from lineloom_service.store.records import LogEntry
 from lineloom_service.store.sql_store import SqlStore
 from lineloom_service.store.sqlite_database import SqliteDatabase
@@ -95,8 +96,8 @@ async def _log(directory: Path) -> dict[str, list[LogEntry]]:
     await store.open()
     logs = {}
     for record in await store.sites():
-        assert await store.skips(record.id) == []
-        logs[record.name] = await store.read_feed(record.id, 0, 10**6)
+        assert await store.read(read_skips, record.id) == []
+        logs[record.name] = await store.read(read_feed, record.id, 0, 10**6)
     await store.close()
     return logs
 

@@ -14,8 +14,10 @@ import pytest
 from lineloom_core.geometry import Pose
 from lineloom_core.scan import Mount, Scan
 from lineloom_service.engine.local_engine import LocalEngine
+from lineloom_service.store.actions import delete_site, forget_robot, set_mount
 from lineloom_service.store.codec import decode_scan, encode_mount, encode_scan
 from lineloom_service.store.records import SnapshotRecord
+from lineloom_service.store.snapshots import read_snapshot, save_snapshot
 
 from tests.service.system import PRODUCER, System, fingerprint, running
 
@@ -108,7 +110,7 @@ async def test_a_restart_goes_on_from_the_snapshot(
     async with _running(tmp_path) as system:
         published = await system.caught_up()
         assert (published.position, published.scans) == (120, 120)
-        snapshot = await system.store.latest_snapshot(1, PRODUCER)
+        snapshot = await system.store.read(read_snapshot, 1, PRODUCER)
         assert snapshot is not None
         assert snapshot.position == 120  # saved when the first service stopped
         await system.post(range(120, 200))
@@ -121,7 +123,9 @@ async def test_an_unreadable_snapshot_is_dropped_and_the_log_replayed(
     async with _running(tmp_path) as system:
         await system.post(range(200))
         await system.caught_up()
-        await system.store.save_snapshot(1, SnapshotRecord(200, 200, PRODUCER, b"rubbish"))
+        await system.store.write_as_engine(
+            save_snapshot, 1, SnapshotRecord(200, 200, PRODUCER, b"rubbish")
+        )
     async with _running(tmp_path) as system:
         assert fingerprint((await system.caught_up()).view) == undisturbed
 
@@ -178,12 +182,12 @@ async def test_a_failure_that_does_not_come_again_costs_no_scan(
 
 async def test_mounts_and_forgetting_reach_the_mapper_in_order(tmp_path: Path) -> None:
     async with _running(tmp_path) as system:
-        await system.store.set_mount("site", "r", encode_mount(Mount(Pose(0.1, 0.0, 0.0))))
+        await system.store.write(set_mount, "site", "r", encode_mount(Mount(Pose(0.1, 0.0, 0.0))))
         await system.post(range(3))
         view = (await system.caught_up()).view
         assert view.version == 4
         assert view.robots["r"].scans_processed == 3
-        await system.store.forget_robot("site", "r")
+        await system.store.write(forget_robot, "site", "r")
         published = await system.caught_up()
         assert published.view.robots == {}
         assert (published.view.version, published.scans) == (5, 3)
@@ -194,10 +198,10 @@ async def test_an_idle_site_is_saved(tmp_path: Path) -> None:
         await system.post(range(5))
         await system.caught_up()
         for _ in range(200):
-            if await system.store.latest_snapshot(1, PRODUCER):
+            if await system.store.read(read_snapshot, 1, PRODUCER):
                 break
             await asyncio.sleep(0.02)
-        snapshot = await system.store.latest_snapshot(1, PRODUCER)
+        snapshot = await system.store.read(read_snapshot, 1, PRODUCER)
         assert snapshot is not None
         assert (snapshot.position, snapshot.scans) == (5, 5)
 
@@ -206,7 +210,7 @@ async def test_a_deleted_site_stops_being_mapped(tmp_path: Path) -> None:
     async with _running(tmp_path) as system:
         await system.post(range(20))
         await system.caught_up()
-        assert await system.store.delete_site("site") == 1
+        assert await system.store.write(delete_site, "site") == 1
         await system.conductor.forget_site(1)
         await system.post(range(3))
         published = await system.caught_up()

@@ -14,10 +14,13 @@ from lineloom_service.engine import site_runner
 from lineloom_service.engine.conductor import Conductor
 from lineloom_service.engine.local_engine import LocalEngine
 from lineloom_service.settings import Settings
+from lineloom_service.store.actions import append_scans
 from lineloom_service.store.codec import encode_scan
 from lineloom_service.store.records import NewScan, SnapshotRecord, StoreError
+from lineloom_service.store.snapshots import read_snapshot
 from lineloom_service.store.sql_store import SqlStore
 from lineloom_service.store.sqlite_database import SqliteDatabase
+from lineloom_service.store.transaction import Transaction
 
 from tests.service.system import PRODUCER
 
@@ -50,7 +53,7 @@ async def _post(store: SqlStore, seq: int, stamp: float) -> None:
         seq=seq,
     )
     scans = [NewScan("0", seq, encode_scan(scan))]
-    await store.append_scans("s", "r", scans, processed=0, limit=100)
+    await store.write(append_scans, "s", "r", scans, processed=0, limit=100)
 
 
 async def _until(done: Callable[[], bool]) -> None:
@@ -60,7 +63,7 @@ async def _until(done: Callable[[], bool]) -> None:
 
 
 async def _saved(store: SqlStore) -> int:
-    snapshot = await store.latest_snapshot(SITE, PRODUCER)
+    snapshot = await store.read(read_snapshot, SITE, PRODUCER)
     return 0 if snapshot is None else snapshot.position
 
 
@@ -108,11 +111,11 @@ async def test_a_snapshot_that_the_disk_does_not_take_is_tried_again(
     said = "its map is not saved beyond entry 0: the storage failed: disk is full"
     async with _mapping(tmp_path) as (store, conductor):
 
-        async def full(site_id: int, record: SnapshotRecord) -> None:
+        def full(tx: Transaction, site_id: int, record: SnapshotRecord) -> None:
             raise StoreError("the storage failed: disk is full")
 
         with monkeypatch.context() as full_disk:
-            full_disk.setattr(store, "save_snapshot", full)
+            full_disk.setattr(site_runner, "save_snapshot", full)
             await _post(store, 0, 0.0)
             await _until(lambda: conductor.trouble(SITE) == said)
             await _post(store, 1, 1.0)

@@ -14,7 +14,9 @@ from lineloom_core.scan import Scan
 from lineloom_service.engine.conductor import Conductor
 from lineloom_service.engine.local_engine import LocalEngine
 from lineloom_service.settings import Settings
+from lineloom_service.store.actions import append_scans
 from lineloom_service.store.codec import encode_scan
+from lineloom_service.store.reads import read_feed
 from lineloom_service.store.records import NewScan, StoreError
 from lineloom_service.store.sql_store import SqlStore
 from lineloom_service.store.sqlite_database import SqliteDatabase
@@ -43,7 +45,7 @@ def _scan(seq: int, beams: int = 20) -> NewScan:
 
 async def _post(store: SqlStore, seqs: range, site: str = "s", beams: int = 20) -> int:
     scans = [_scan(seq, beams) for seq in seqs]
-    answer = await store.append_scans(site, "r", scans, processed=0, limit=10**9)
+    answer = await store.write(append_scans, site, "r", scans, processed=0, limit=10**9)
     return answer.accepted
 
 
@@ -77,7 +79,7 @@ async def test_a_full_disk_refuses_whole_posts_and_goes_on_when_there_is_room(
     record = await store.site("s")
     assert record is not None
     assert record.accepted == taken  # the refused ten are not among them
-    entries = await store.read_feed(record.id, 0, 10**6)
+    entries = await store.read(read_feed, record.id, 0, 10**6)
     assert [entry.seq for entry in entries] == list(range(taken))
     set_limit(10**6)
     assert await _post(store, range(taken, taken + 10)) == 10

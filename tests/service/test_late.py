@@ -14,7 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lineloom_core.scan import Scan
 from lineloom_service.engine.mapper import apply
+from lineloom_service.store.actions import append_scans
 from lineloom_service.store.codec import decode_scan, encode_scan
+from lineloom_service.store.reads import read_feed
 from lineloom_service.store.records import LogEntry, NewScan
 from lineloom_service.store.sql_store import SqlStore
 from lineloom_service.store.sqlite_database import SqliteDatabase
@@ -48,7 +50,7 @@ async def _logged(
         await store.open()
         accepted = 0
         for scans in posts:
-            answer = await store.append_scans("s", "r", scans, processed=0, limit=10**6)
+            answer = await store.write(append_scans, "s", "r", scans, processed=0, limit=10**6)
             accepted += answer.accepted
         for _ in range(500):
             record = await store.site("s")
@@ -57,7 +59,7 @@ async def _logged(
                 break
             await asyncio.sleep(0.01)
         assert record is not None
-        entries = await store.read_feed(record.id, 0, 10**5)
+        entries = await store.read(read_feed, record.id, 0, 10**5)
         await store.close()
     return entries, accepted
 

@@ -6,8 +6,11 @@ from pathlib import Path
 
 import pytest
 import sqlalchemy as sa
+from lineloom_service.store.actions import append_scans
 from lineloom_service.store.migrate import downgrade, migrate
+from lineloom_service.store.reads import read_feed
 from lineloom_service.store.records import NewScan, SnapshotRecord, StoreError
+from lineloom_service.store.snapshots import read_chapters, read_snapshot, save_snapshot
 from lineloom_service.store.sql_store import SqlStore
 from lineloom_service.store.sqlite_database import SqliteDatabase
 from lineloom_service.store.sqlite_engine import sqlite_engine
@@ -30,16 +33,16 @@ async def test_a_database_of_the_first_version_is_upgraded_with_all_it_holds(
     assert (record.position, record.held, record.accepted) == (4, 1, 4)
     assert record.robots["r"].mount == b"m"
     assert list(record.robots) == ["r"]
-    again = await store.append_scans(
-        "site", "r", [*SCANS, NewScan("0", 3, b"scan 3")], processed=0, limit=100
+    again = await store.write(
+        append_scans, "site", "r", [*SCANS, NewScan("0", 3, b"scan 3")], processed=0, limit=100
     )
     assert (again.accepted, again.duplicates) == (1, 4)
-    feed = await store.read_feed(record.id, 0, 100)
+    feed = await store.read(read_feed, record.id, 0, 100)
     assert [(e.kind, e.seq, e.body) for e in feed] == [
         ("mount", None, b"m"),
         *(("scan", seq, b"scan %d" % seq) for seq in range(5)),
     ]
-    await store.save_snapshot(record.id, SnapshotRecord(6, 5, "v1", b"state"))
+    await store.write_as_engine(save_snapshot, record.id, SnapshotRecord(6, 5, "v1", b"state"))
     await store.close()
 
 
@@ -49,9 +52,9 @@ async def test_a_snapshot_from_before_there_were_chapters_goes_on_from_none(
     make_old_file(tmp_path / "lineloom.db", "0007")
     store = _store(tmp_path)
     await store.open()
-    snapshot = await store.latest_snapshot(1, "v1")
+    snapshot = await store.read(read_snapshot, 1, "v1")
     assert snapshot == SnapshotRecord(4, 3, "v1", b"old")
-    assert [chapter async for chapter in store.chapters(1, snapshot)] == []
+    assert [chapter async for chapter in read_chapters(store, 1, snapshot)] == []
     await store.close()
 
 
@@ -61,8 +64,10 @@ async def test_going_back_a_version_leaves_no_snapshot_without_its_chapters(
     make_old_file(tmp_path / "lineloom.db", "0001")
     store = _store(tmp_path)
     await store.open()
-    await store.save_snapshot(1, SnapshotRecord(2, 1, "v1", b"whole"))
-    await store.save_snapshot(1, SnapshotRecord(4, 3, "v1", b"rest", 0, (b"chapter",)))
+    await store.write_as_engine(save_snapshot, 1, SnapshotRecord(2, 1, "v1", b"whole"))
+    await store.write_as_engine(
+        save_snapshot, 1, SnapshotRecord(4, 3, "v1", b"rest", 0, (b"chapter",))
+    )
     await store.close()
     engine = sqlite_engine(tmp_path / "lineloom.db")
     with engine.begin() as connection:

@@ -11,8 +11,16 @@ import sqlalchemy as sa
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from lineloom_service.store import tables
+from lineloom_service.store.actions import (
+    append_scans,
+    delete_site,
+    forget_robot,
+    record_skip,
+    set_mount,
+)
 from lineloom_service.store.choice import database_at
-from lineloom_service.store.files import FileRecord
+from lineloom_service.store.files import FileRecord, delete_file, list_files, put_file, read_file
+from lineloom_service.store.reads import read_feed, read_skips
 from lineloom_service.store.records import (
     BacklogFullError,
     NewScan,
@@ -20,6 +28,7 @@ from lineloom_service.store.records import (
     SnapshotRecord,
     StoreError,
 )
+from lineloom_service.store.snapshots import drop_snapshot, read_snapshot, save_snapshot
 from lineloom_service.store.sql_store import SqlStore
 
 NO_LIMIT = 10**9
@@ -32,8 +41,8 @@ def _scans(seqs: Sequence[int], session: str = "0") -> list[NewScan]:
 
 
 async def _post(store: SqlStore, seqs: Sequence[int], session: str = "0", robot: str = "r") -> int:
-    answer = await store.append_scans(
-        "site", robot, _scans(seqs, session), processed=0, limit=NO_LIMIT
+    answer = await store.write(
+        append_scans, "site", robot, _scans(seqs, session), processed=0, limit=NO_LIMIT
     )
     return answer.accepted
 
@@ -45,7 +54,7 @@ async def _record(store: SqlStore) -> SiteRecord:
 
 
 async def _feed(store: SqlStore) -> list[tuple[str, str | None, int | None]]:
-    entries = await store.read_feed((await _record(store)).id, 0, 10_000)
+    entries = await store.read(read_feed, (await _record(store)).id, 0, 10_000)
     assert [e.position for e in entries] == list(range(1, len(entries) + 1))
     return [(e.kind, e.session, e.seq) for e in entries]
 
@@ -71,14 +80,16 @@ async def store(make_store: MakeStore) -> AsyncIterator[SqlStore]:
 
 async def test_sending_again_changes_nothing(store: SqlStore) -> None:
     assert await _post(store, range(10)) == 10
-    again = await store.append_scans("site", "r", _scans(range(5, 15)), processed=0, limit=NO_LIMIT)
+    again = await store.write(
+        append_scans, "site", "r", _scans(range(5, 15)), processed=0, limit=NO_LIMIT
+    )
     assert (again.accepted, again.duplicates) == (5, 5)
     assert [seq for _, _, seq in await _feed(store)] == list(range(15))
 
 
 async def test_the_same_seq_twice_in_one_post_is_one_scan(store: SqlStore) -> None:
-    answer = await store.append_scans(
-        "site", "r", _scans([0, 1, 1, 0]), processed=0, limit=NO_LIMIT
+    answer = await store.write(
+        append_scans, "site", "r", _scans([0, 1, 1, 0]), processed=0, limit=NO_LIMIT
     )
     assert (answer.accepted, answer.duplicates) == (2, 2)
 
@@ -154,8 +165,8 @@ async def test_concurrent_posts_share_commits_and_each_counts_once(store: SqlSto
 
 async def test_a_mount_is_logged_once_between_the_scans_it_divides(store: SqlStore) -> None:
     await _post(store, [0, 2])
-    await store.set_mount("site", "r", b"m")
-    await store.set_mount("site", "r", b"m")
+    await store.write(set_mount, "site", "r", b"m")
+    await store.write(set_mount, "site", "r", b"m")
     await _post(store, [3])
     assert await _feed(store) == [
         ("scan", "0", 0),
@@ -168,8 +179,8 @@ async def test_a_mount_is_logged_once_between_the_scans_it_divides(store: SqlSto
 
 async def test_a_forgotten_robot_may_start_anew(store: SqlStore) -> None:
     await _post(store, [0, 1])
-    assert await store.forget_robot("site", "r")
-    assert not await store.forget_robot("site", "r")
+    assert await store.write(forget_robot, "site", "r")
+    assert not await store.write(forget_robot, "site", "r")
     assert "r" not in (await _record(store)).robots
     assert await _post(store, [0]) == 1
     record = await _record(store)
@@ -181,13 +192,13 @@ async def test_a_forgotten_robot_may_start_anew(store: SqlStore) -> None:
 async def test_a_deleted_site_leaves_nothing_and_its_id_never_comes_back(store: SqlStore) -> None:
     await _post(store, range(50))
     old = (await _record(store)).id
-    await store.save_snapshot(old, SnapshotRecord(50, 50, "me", b"data"))
-    assert await store.delete_site("site") == old
+    await store.write_as_engine(save_snapshot, old, SnapshotRecord(50, 50, "me", b"data"))
+    assert await store.write(delete_site, "site") == old
     assert await store.site("site") is None
-    assert await store.delete_site("site") is None
+    assert await store.write(delete_site, "site") is None
     for _ in range(200):
         await asyncio.sleep(0.02)
-        if not await store.read_feed(old, 0, 1):
+        if not await store.read(read_feed, old, 0, 1):
             break
     assert await _post(store, [0]) == 1
     assert (await _record(store)).id > old
@@ -197,7 +208,7 @@ async def test_a_deleted_site_leaves_nothing_and_its_id_never_comes_back(store: 
         return connection.execute(query).scalar_one()
 
     for _ in range(200):
-        if (count := await store._read(count_sites)) == 1:
+        if (count := await store.read(count_sites)) == 1:
             break
         await asyncio.sleep(0.02)
     assert count == 1
@@ -206,17 +217,19 @@ async def test_a_deleted_site_leaves_nothing_and_its_id_never_comes_back(store: 
 async def test_a_full_backlog_takes_nothing(store: SqlStore) -> None:
     await _post(store, range(10))
     with pytest.raises(BacklogFullError) as refusal:
-        await store.append_scans("site", "r", _scans(range(10, 20)), processed=2, limit=15)
+        await store.write(append_scans, "site", "r", _scans(range(10, 20)), processed=2, limit=15)
     assert refusal.value.pending == 8
     assert (await _record(store)).accepted == 10
-    taken = await store.append_scans("site", "r", _scans(range(10, 20)), processed=5, limit=15)
+    taken = await store.write(
+        append_scans, "site", "r", _scans(range(10, 20)), processed=5, limit=15
+    )
     assert taken.accepted == 10
 
 
 async def test_a_flooding_robot_is_stopped_while_the_others_are_taken(store: SqlStore) -> None:
     async def send(robot: str, seqs: Sequence[int], processed: int = 0) -> int:
-        answer = await store.append_scans(
-            "site", robot, _scans(seqs), processed=processed, limit=30, robot_limit=10
+        answer = await store.write(
+            append_scans, "site", robot, _scans(seqs), processed=processed, limit=30, robot_limit=10
         )
         return answer.accepted
 
@@ -234,7 +247,7 @@ async def test_a_flooding_robot_is_stopped_while_the_others_are_taken(store: Sql
 
 
 async def test_a_site_that_has_caught_up_takes_any_batch(store: SqlStore) -> None:
-    answer = await store.append_scans("site", "r", _scans(range(10)), processed=0, limit=5)
+    answer = await store.write(append_scans, "site", "r", _scans(range(10)), processed=0, limit=5)
     assert answer.accepted == 10
 
 
@@ -242,7 +255,7 @@ async def test_one_failing_request_does_not_spoil_the_commit_it_shares(store: Sq
     await _post(store, [0])
     results = await asyncio.gather(
         _post(store, [1]),
-        store.record_skip(999, 1, "no such site"),
+        store.write_as_engine(record_skip, 999, 1, "no such site"),
         _post(store, [2]),
         return_exceptions=True,
     )
@@ -254,10 +267,10 @@ async def test_one_failing_request_does_not_spoil_the_commit_it_shares(store: Sq
 async def test_skips_name_their_scan_and_the_first_reason_stands(store: SqlStore) -> None:
     await _post(store, [0, 1])
     site = (await _record(store)).id
-    await store.record_skip(site, 2, "first")
-    skip = await store.record_skip(site, 2, "second")
+    await store.write_as_engine(record_skip, site, 2, "first")
+    skip = await store.write_as_engine(record_skip, site, 2, "second")
     assert (skip.robot, skip.session, skip.seq, skip.reason) == ("r", "0", 1, "first")
-    assert await store.skips(site) == [skip]
+    assert await store.read(read_skips, site) == [skip]
 
 
 async def test_two_snapshots_are_kept_and_only_of_the_same_producer_used(
@@ -266,14 +279,16 @@ async def test_two_snapshots_are_kept_and_only_of_the_same_producer_used(
     await _post(store, range(5))
     site = (await _record(store)).id
     for position in (1, 3, 5):
-        await store.save_snapshot(site, SnapshotRecord(position, position, "v1", b"%d" % position))
-    latest = await store.latest_snapshot(site, "v1")
+        await store.write_as_engine(
+            save_snapshot, site, SnapshotRecord(position, position, "v1", b"%d" % position)
+        )
+    latest = await store.read(read_snapshot, site, "v1")
     assert latest == SnapshotRecord(5, 5, "v1", b"5")
-    assert await store.latest_snapshot(site, "v2") is None
-    await store.drop_snapshot(site, 5)
-    assert await store.latest_snapshot(site, "v1") == SnapshotRecord(3, 3, "v1", b"3")
-    await store.drop_snapshot(site, 3)
-    assert await store.latest_snapshot(site, "v1") is None
+    assert await store.read(read_snapshot, site, "v2") is None
+    await store.write_as_engine(drop_snapshot, site, 5)
+    assert await store.read(read_snapshot, site, "v1") == SnapshotRecord(3, 3, "v1", b"3")
+    await store.write_as_engine(drop_snapshot, site, 3)
+    assert await store.read(read_snapshot, site, "v1") is None
 
 
 async def test_migrations_and_tables_say_the_same(store: SqlStore) -> None:
@@ -283,7 +298,7 @@ async def test_migrations_and_tables_say_the_same(store: SqlStore) -> None:
         )
         return found
 
-    assert await store._read(differences) == []
+    assert await store.read(differences) == []
 
 
 def _file(name: str, content: bytes, created: float) -> FileRecord:
@@ -296,23 +311,23 @@ async def test_files_are_kept_replaced_and_listed_without_their_data(
     await _post(store, [0])
     site = (await _record(store)).id
     first, second = _file("b", b"one", 1.0), _file("a", b"two", 2.0)
-    assert await store.put_file(site, "export", first)
-    assert await store.put_file(site, "export", second)
-    assert await store.put_file(site, "floorplan", _file("plan", b"walls", 3.0))
-    assert await store.put_file(site, "floorplan", _file("plan", b"other walls", 4.0))
-    listed = await store.files(site, "export")
+    assert await store.write(put_file, site, "export", first)
+    assert await store.write(put_file, site, "export", second)
+    assert await store.write(put_file, site, "floorplan", _file("plan", b"walls", 3.0))
+    assert await store.write(put_file, site, "floorplan", _file("plan", b"other walls", 4.0))
+    listed = await store.read(list_files, site, "export")
     assert [(f.name, f.size, f.data) for f in listed] == [("b", 3, None), ("a", 3, None)]
     await store.close()
     again = make_store()
     await again.open()
     try:
-        assert await again.read_file(site, "export", "b") == first
-        plan = await again.read_file(site, "floorplan", "plan")
+        assert await again.read(read_file, site, "export", "b") == first
+        plan = await again.read(read_file, site, "floorplan", "plan")
         assert plan is not None
         assert plan.data == b"other walls"
-        assert await again.read_file(site, "export", "plan") is None
-        assert await again.delete_file(site, "export", "b")
-        assert not await again.delete_file(site, "export", "b")
+        assert await again.read(read_file, site, "export", "plan") is None
+        assert await again.write(delete_file, site, "export", "b")
+        assert not await again.write(delete_file, site, "export", "b")
     finally:
         await again.close()
     await store.open()
@@ -321,11 +336,11 @@ async def test_files_are_kept_replaced_and_listed_without_their_data(
 async def test_files_go_with_their_site(store: SqlStore) -> None:
     await _post(store, [0])
     site = (await _record(store)).id
-    await store.put_file(site, "export", _file("a", b"one", 1.0))
-    await store.delete_site("site")
+    await store.write(put_file, site, "export", _file("a", b"one", 1.0))
+    await store.write(delete_site, "site")
     for _ in range(200):
-        if not await store.files(site, "export"):
+        if not await store.read(list_files, site, "export"):
             break
         await asyncio.sleep(0.01)
-    assert await store.files(site, "export") == []
-    assert not await store.put_file(site, "export", _file("a", b"late", 2.0))
+    assert await store.read(list_files, site, "export") == []
+    assert not await store.write(put_file, site, "export", _file("a", b"late", 2.0))

@@ -10,6 +10,7 @@ from typing import Any
 import httpx
 from lineloom_service.engine.mapper import apply
 from lineloom_service.store.choice import database_at
+from lineloom_service.store.reads import read_feed, read_skips
 from lineloom_service.store.records import LogEntry
 from lineloom_service.store.sql_store import SqlStore
 
@@ -34,8 +35,8 @@ async def _entries(path: Path, url: str | None) -> list[LogEntry]:
     await store.open()
     try:
         (record,) = await store.sites()
-        assert await store.skips(record.id) == []
-        return await store.read_feed(record.id, 0, 10**6)
+        assert await store.read(read_skips, record.id) == []
+        return await store.read(read_feed, record.id, 0, 10**6)
     finally:
         await store.close()
 

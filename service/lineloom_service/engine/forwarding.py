@@ -12,6 +12,7 @@ from typing import Any
 
 from lineloom_service.engine.protocol import QuestionFailedError, WorkerDiedError
 from lineloom_service.store.protocol import Store
+from lineloom_service.store.questions import post_answer, post_question, read_question, take_answer
 from lineloom_service.store.records import StoreError
 
 _LOG = logging.getLogger(__name__)
@@ -35,7 +36,8 @@ class Forwarding:
         key = uuid.uuid4().hex
         news = self._waiting[key] = asyncio.Event()
         try:
-            await self._store.post_question(key, pickle.dumps((site_id, question, arguments)))
+            asked = pickle.dumps((site_id, question, arguments))
+            await self._store.write_apart(post_question, key, asked)
             async with asyncio.timeout(_PATIENCE_S):
                 answer = await self._await_answer(key, news)
         except (TimeoutError, StoreError) as error:
@@ -68,17 +70,17 @@ class Forwarding:
                 async with asyncio.timeout(_LOOK_S):
                     await news.wait()
             news.clear()
-            answer = await self._store.take_answer(key)
+            answer = await self._store.write_apart(take_answer, key)
             if answer is not None:
                 return answer
 
     async def _reply(self, key: str) -> None:
         try:
-            question = await self._store.question(key)
+            question = await self._store.read(read_question, key)
             if question is None:
                 return
             answer = await self._answered(*pickle.loads(question))
-            await self._store.post_answer(key, pickle.dumps(answer))
+            await self._store.write_apart(post_answer, key, pickle.dumps(answer))
         except StoreError:
             _LOG.exception("a forwarded question is not answered")
 

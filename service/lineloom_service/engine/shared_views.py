@@ -8,7 +8,9 @@ import time
 
 from lineloom_service.engine.published import Published
 from lineloom_service.engine.view_record import ViewReader, write_view
+from lineloom_service.store.actions import save_view
 from lineloom_service.store.protocol import Store
+from lineloom_service.store.reads import read_view
 from lineloom_service.store.records import StoreError
 
 _LOG = logging.getLogger(__name__)
@@ -68,7 +70,7 @@ class SharedViews:
         for site_id, published in list(self._to_save.items()):
             try:
                 record = await asyncio.to_thread(write_view, published)
-                await self._store.save_view(site_id, record)
+                await self._store.write_apart_as_engine(save_view, site_id, record)
             except StoreError:
                 _LOG.warning("the last view of site %d is not shared", site_id)
         self._to_save.clear()
@@ -84,7 +86,7 @@ class SharedViews:
             begin = time.monotonic()
             try:
                 record = await asyncio.to_thread(write_view, published)
-                await self._store.save_view(site_id, record)
+                await self._store.write_apart_as_engine(save_view, site_id, record)
             except StoreError as error:
                 _LOG.warning("site %d: a view is not shared: %s", site_id, error)
                 self._to_save.setdefault(site_id, published)
@@ -100,7 +102,8 @@ class SharedViews:
             self._wanted.discard(site_id)
             known = self._views.get(site_id)
             try:
-                record = await self._store.view(site_id, -1 if known is None else known.position)
+                after = -1 if known is None else known.position
+                record = await self._store.read(read_view, site_id, after)
                 if record is not None:
                     reader = self._readers.setdefault(site_id, ViewReader())
                     self._views[site_id] = await asyncio.to_thread(reader.read, record)

@@ -19,7 +19,9 @@ from lineloom_service.engine.protocol import (
     WorkerDiedError,
 )
 from lineloom_service.engine.published import Published
+from lineloom_service.store.actions import record_skip
 from lineloom_service.store.protocol import Store
+from lineloom_service.store.reads import read_feed, read_skips
 from lineloom_service.store.records import (
     ChapterLostError,
     LogEntry,
@@ -27,6 +29,12 @@ from lineloom_service.store.records import (
     Skip,
     SnapshotRecord,
     StoreError,
+)
+from lineloom_service.store.snapshots import (
+    drop_snapshot,
+    read_chapters,
+    read_snapshot,
+    save_snapshot,
 )
 
 _LOG = logging.getLogger(__name__)
@@ -134,7 +142,7 @@ class SiteRunner:
         """Keep the site hosted and fed, whatever happens to its worker."""
         while True:
             try:
-                self.skips = {s.position: s for s in await self._store.skips(self.site)}
+                self.skips = {s.position: s for s in await self._store.read(read_skips, self.site)}
                 await self._host()
             except MapperFailedError as failure:
                 await self._strike(failure.position, "raised", failure.reason)
@@ -173,7 +181,7 @@ class SiteRunner:
                 taken.first,
                 taken.chapters,
             )
-            await self._store.save_snapshot(self.site, record)
+            await self._store.write_as_engine(save_snapshot, self.site, record)
         except (SnapshotFailedError, StoreError) as error:
             if "saving" not in self._troubles:
                 _LOG.exception("site %s: its map cannot be saved, trying again", self.name)
@@ -208,7 +216,7 @@ class SiteRunner:
 
     async def _resume(self) -> None:
         """Start from the latest snapshot, or from nothing."""
-        snapshot = await self._store.latest_snapshot(self.site, self._producer)
+        snapshot = await self._store.read(read_snapshot, self.site, self._producer)
         self._saved = 0 if snapshot is None else snapshot.position
         self._chapters = 0 if snapshot is None else snapshot.end
         self._scans_sent = self._scans_done = 0 if snapshot is None else snapshot.scans
@@ -220,14 +228,14 @@ class SiteRunner:
         if snapshot is None:
             await self._engine.start_site(self.site, 0, None)
         else:
-            chapters = self._store.chapters(self.site, snapshot)
+            chapters = read_chapters(self._store, self.site, snapshot)
             await self._engine.start_site(self.site, self._saved, snapshot.data, chapters)
 
     async def _send(self) -> None:
         # The next events go on from the view right there, so that view has to be published.
         short_of = self._recorded - self._sent
         limit = min(self._pace.chunk, short_of) if short_of > 0 else self._pace.chunk
-        entries = await self._store.read_feed(self.site, self._sent, limit)
+        entries = await self._store.read(read_feed, self.site, self._sent, limit)
         if not entries:  # the site was deleted: its runner is about to be stopped
             self._end = self._sent
             return
@@ -288,7 +296,7 @@ class SiteRunner:
             await self._drop_snapshot(reason)
             return
         try:
-            await self._store.record_skip(self.site, position, reason)
+            await self._store.write_as_engine(record_skip, self.site, position, reason)
         except StoreError:
             _LOG.exception("site %s: entry %d could not be skipped", self.name, position)
             await asyncio.sleep(1.0)
@@ -302,7 +310,7 @@ class SiteRunner:
             return
         _LOG.error("site %s: snapshot %d is unreadable: %s", self.name, self._saved, reason)
         try:
-            await self._store.drop_snapshot(self.site, self._saved)
+            await self._store.write_as_engine(drop_snapshot, self.site, self._saved)
         except StoreError:
             _LOG.exception("site %s: snapshot %d could not be removed", self.name, self._saved)
             await asyncio.sleep(_AGAIN_S)

@@ -13,6 +13,7 @@ from lineloom import wire
 from lineloom_service.events.codec import Place, Told, encode, unpack
 from lineloom_service.events.hub import EventHub
 from lineloom_service.store.protocol import Store
+from lineloom_service.store.reads import read_events, read_last_events
 
 _PORTION = 32
 """Batches read from the store at a time: what one listener costs in memory."""
@@ -45,7 +46,7 @@ class EventFeed:
         Returns a `reset` where the history does not reach back to where it left off. version: the
         site's now.
         """
-        last = await self._store.last_events(self._site_id)
+        last = await self._store.read(read_last_events, self._site_id)
         end = Place(self._site_id, 0 if last is None else last.number)
         if not last_event_id:
             self._place = end
@@ -53,7 +54,7 @@ class EventFeed:
         wanted = Place.parse(last_event_id)
         if wanted is not None and wanted.site_id == self._site_id and wanted.number <= end.number:
             back = wanted.number if wanted.seen is None else wanted.number - 1
-            following = await self._store.read_events(self._site_id, max(0, back), 1)
+            following = await self._store.read(read_events, self._site_id, max(0, back), 1)
             reaches_back = back == end.number or (following and following[0].number == back + 1)
             if back >= 0 and reaches_back:
                 self._place = wanted
@@ -96,7 +97,7 @@ class EventFeed:
         after = place.number if place.seen is None else place.number - 1
         batches = self._hub.recent(self._site_id, after)
         if not batches:
-            stored = await self._store.read_events(self._site_id, after, _PORTION)
+            stored = await self._store.read(read_events, self._site_id, after, _PORTION)
             if stored and stored[0].number != after + 1:
                 reason = "this listener was too slow, what it has not read is no longer kept"
                 end = Place(self._site_id, stored[-1].number)

@@ -18,7 +18,9 @@ from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_service.events.codec import Told, encode, pack
 from lineloom_service.events.difference import events_between
 from lineloom_service.events.hub import EventHub
+from lineloom_service.store.actions import append_events
 from lineloom_service.store.protocol import Store
+from lineloom_service.store.reads import read_last_events
 from lineloom_service.store.records import EventBatch, StoreError
 
 _LOG = logging.getLogger(__name__)
@@ -63,7 +65,7 @@ class EventRecorder:
         """Return the log position that a site's events go up to. Asked before it is mapped."""
         history = self._histories.get(site_id)
         if history is None:
-            last = await self._store.last_events(site_id)
+            last = await self._store.read(read_last_events, site_id)
             history = (
                 _History(0, 0, 0, self._producer)
                 if last is None
@@ -128,7 +130,7 @@ class EventRecorder:
             )
             try:
                 if told:
-                    await self._store.append_events(site_id, batch, self._kept)
+                    await self._store.write_as_engine(append_events, site_id, batch, self._kept)
             except StoreError:
                 _LOG.exception("events are not kept, trying again")
                 history.waiting = history.waiting or publication

@@ -30,6 +30,7 @@ from lineloom_service.errors import INVALID_PARAMETER, UNKNOWN_CONSTRAINT, Probl
 from lineloom_service.map_frames import versioned
 from lineloom_service.openapi import NOT_MODIFIED, also_as
 from lineloom_service.service import Service
+from lineloom_service.store.actions import act
 from lineloom_service.store.records import ActionKind, SiteRecord
 
 _FORMATS = ("json", "svg")
@@ -136,7 +137,7 @@ async def _act(
     constraint = _find(site, view, name)
     robots = _robots(view)
     robot = robots.get(constraint.keyframe_b) or robots.get(constraint.keyframe_a, "")
-    position = await service.store.act(site.name, robot, action, name)
+    position = await service.store.write(act, site.name, robot, action, name)
     if position is None:
         raise _unknown(site, name)
     followed = await service.conductor.reached(site.id, position, _FOLLOW_S)

@@ -28,7 +28,7 @@ from lineloom_service.map_frames import in_frame
 from lineloom_service.openapi import also_as, body_of
 from lineloom_service.request_body import read_body
 from lineloom_service.service import Service
-from lineloom_service.store.files import FileRecord
+from lineloom_service.store.files import FileRecord, delete_file, list_files, put_file, read_file
 from lineloom_service.store.records import SiteRecord
 
 router = APIRouter(tags=["exports"])
@@ -56,9 +56,9 @@ async def post_export(
         raise ProblemError(UNKNOWN_COMPONENT, detail)
     content = await _render(service, site, view, wanted)
     file = _file(view, wanted, content)
-    kept = await service.store.read_file(site.id, "export", file.name)
+    kept = await service.store.read(read_file, site.id, "export", file.name)
     if kept is None:
-        await service.store.put_file(site.id, "export", file)
+        await service.store.write(put_file, site.id, "export", file)
     export = _export(request, site, kept or file)
     return answer(export, status=201, headers={"Location": export.url})
 
@@ -66,7 +66,7 @@ async def post_export(
 @router.get("/v1/sites/{site}/exports", response_model=wire.ExportList)
 async def list_exports(site: KnownSite, request: Request, service: ServiceDep) -> Response:
     """Return the exports of a site, oldest first."""
-    files = await service.store.files(site.id, "export")
+    files = await service.store.read(list_files, site.id, "export")
     exports = [_export(request, site, file) for file in files]
     return answer(wire.ExportList(site=site.name, exports=exports))
 
@@ -81,7 +81,7 @@ async def get_export(
     site: KnownSite, export: str, request: Request, service: ServiceDep
 ) -> Response:
     """Return an export's bytes; they never change."""
-    file = await service.store.read_file(site.id, "export", export)
+    file = await service.store.read(read_file, site.id, "export", export)
     if file is None or file.data is None:
         raise _unknown(site, export)
     etag = f'"{file.sha256}"'
@@ -101,7 +101,7 @@ async def get_export(
 @router.delete("/v1/sites/{site}/exports/{export}", status_code=204)
 async def delete_export(site: KnownSite, export: str, service: ServiceDep) -> Response:
     """Remove an export that nobody uses any more."""
-    if not await service.store.delete_file(site.id, "export", export):
+    if not await service.store.write(delete_file, site.id, "export", export):
         raise _unknown(site, export)
     return Response(status_code=204)
 

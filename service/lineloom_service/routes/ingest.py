@@ -10,6 +10,7 @@ from lineloom_service.dependencies import RobotName, ServiceDep, SiteName
 from lineloom_service.intake import take_in
 from lineloom_service.openapi import body_of
 from lineloom_service.request_body import read_body
+from lineloom_service.store.actions import append_scans
 
 router = APIRouter(tags=["ingest"])
 
@@ -28,7 +29,8 @@ async def post_scans(
     body = await read_body(request, settings)
     intake = await take_in(body, settings.max_batch)
     known = await service.store.site(site)
-    appended = await service.store.append_scans(
+    appended = await service.store.write(
+        append_scans,
         site,
         robot,
         intake.scans,

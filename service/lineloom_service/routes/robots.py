@@ -21,6 +21,7 @@ from lineloom_service.dependencies import (
 from lineloom_service.errors import field_errors, invalid_body
 from lineloom_service.openapi import body_of
 from lineloom_service.request_body import read_body
+from lineloom_service.store.actions import forget_robot, set_mount
 from lineloom_service.store.codec import encode_mount
 
 router = APIRouter(tags=["robots"])
@@ -57,7 +58,7 @@ async def put_robot(
     except ValidationError as error:
         raise invalid_body(field_errors(error)) from None
     mount = None if settings.mount is None else encode_mount(to_mount(settings.mount))
-    await service.store.set_mount(site, robot, mount)
+    await service.store.write(set_mount, site, robot, mount)
     record = await known_site(site, service)
     view = service.conductor.published(record.id).view
     skips = service.conductor.skips(record.id)
@@ -67,5 +68,5 @@ async def put_robot(
 @router.delete("/v1/sites/{site}/robots/{robot}", status_code=204)
 async def delete_robot(site: KnownSite, robot: KnownRobot, service: ServiceDep) -> Response:
     """Forget a robot: what it alone has seen leaves the map. Its name may start anew."""
-    await service.store.forget_robot(site.name, robot.name)
+    await service.store.write(forget_robot, site.name, robot.name)
     return Response(status_code=204)

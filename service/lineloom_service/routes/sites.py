@@ -9,6 +9,7 @@ from lineloom_service.answers import answer
 from lineloom_service.convert import to_site
 from lineloom_service.dependencies import KnownSite, ServiceDep
 from lineloom_service.service import Service
+from lineloom_service.store import actions
 from lineloom_service.store.records import SiteRecord
 
 router = APIRouter(tags=["sites"])
@@ -34,7 +35,7 @@ async def get_site(site: KnownSite, service: ServiceDep) -> Response:
 @router.delete("/v1/sites/{site}", status_code=204)
 async def delete_site(site: KnownSite, service: ServiceDep) -> Response:
     """Forget a site: its map and all its scans."""
-    deleted = await service.store.delete_site(site.name)
+    deleted = await service.store.write(actions.delete_site, site.name)
     if deleted is not None:
         await service.conductor.forget_site(deleted)
         service.maps.forget_site(deleted)

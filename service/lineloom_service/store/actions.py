@@ -22,7 +22,6 @@ from lineloom_service.store.records import (
     EventBatch,
     NewScan,
     Skip,
-    StoreError,
     ViewRecord,
 )
 from lineloom_service.store.snapshots import purge_chapters
@@ -40,14 +39,20 @@ def append_scans(
     *,
     processed: int,
     limit: int,
-    robot_limit: int,
-    now: float,
+    robot_limit: int | None = None,
 ) -> Appended:
-    """Store the scans that are new, in the order of seq, and release what need not wait."""
+    """Store scans of one robot, creating site and robot on first use.
+
+    Those that are new, in the order of seq; what need not wait is released.
+    Raises BacklogFullError, taking nothing, where more than `limit` entries wait already, or more
+    than `robot_limit` of this robot's (as many as `limit` if None); `processed`: how many of the
+    site's released entries the mapper is known to be through.
+    """
     known_site = tx.ledger.sites.get(site_name)
     if known_site is not None:
         _check_backlog(known_site, len(scans), processed, limit)
-        _check_robot(tx, known_site, robot_name, len(scans), processed, robot_limit)
+        share = limit if robot_limit is None else robot_limit
+        _check_robot(tx, known_site, robot_name, len(scans), processed, share)
     site = tx.site(site_name)
     robot = tx.robot(site, robot_name)
     by_session: dict[str, dict[int, NewScan]] = {}
@@ -58,9 +63,9 @@ def append_scans(
         stream = tx.stream(robot, session)
         known = tx.known(stream, list(by_seq))
         for seq in sorted(by_seq.keys() - known):
-            tx.add_scan(site, robot, stream, by_seq[seq], now)
+            tx.add_scan(site, robot, stream, by_seq[seq])
             accepted += 1
-    tx.release_scans(site, robot, now)
+    tx.release_scans(site, robot)
     return Appended(accepted, len(scans) - accepted, site.id, site.position, site.held)
 
 
@@ -84,11 +89,15 @@ def _check_robot(
 
 
 def set_mount(tx: Transaction, site_name: str, robot_name: str, mount: bytes | None) -> None:
-    """Log a mount. What was accepted before is released first: it was taken with the old one."""
+    """Log a robot's mount (None: none) for the scans that follow, creating the robot.
+
+    The same again changes nothing. What was accepted before is released first: it was taken with
+    the old one.
+    """
     site = tx.site(site_name)
     robot = tx.robot(site, robot_name)
     if robot.mount != mount:
-        tx.release_scans(site, robot, None)
+        tx.release_scans(site, robot, all_held=True)
         tx.add_control(site, robot, "mount", mount)
         robot.mount = mount
         tx.connection.execute(
@@ -97,12 +106,15 @@ def set_mount(tx: Transaction, site_name: str, robot_name: str, mount: bytes | N
 
 
 def forget_robot(tx: Transaction, site_name: str, robot_name: str) -> bool:
-    """Log that a robot is forgotten. Its name is free again, for a robot that starts anew."""
+    """Log that a robot is forgotten; False where there is none of that name.
+
+    Its name is free again, for a robot that starts anew.
+    """
     site = tx.ledger.sites.get(site_name)
     robot = None if site is None else site.robots.get(robot_name)
     if site is None or robot is None:
         return False
-    tx.release_scans(site, robot, None)
+    tx.release_scans(site, robot, all_held=True)
     tx.add_control(site, robot, "forget", None)
     tx.connection.execute(
         update(tables.robots).where(tables.robots.c.id == robot.id).values(forgotten=True)
@@ -115,7 +127,10 @@ def forget_robot(tx: Transaction, site_name: str, robot_name: str) -> bool:
 def act(
     tx: Transaction, site_name: str, robot_name: str, kind: ActionKind, constraint: str
 ) -> int | None:
-    """Log what an operator does to a constraint of a robot; return the entry's position."""
+    """Log what an operator does to a constraint of a robot; return the entry's position.
+
+    None where there is no such robot.
+    """
     site = tx.ledger.sites.get(site_name)
     robot = None if site is None else site.robots.get(robot_name)
     if site is None or robot is None:
@@ -125,7 +140,7 @@ def act(
 
 
 def delete_site(tx: Transaction, site_name: str) -> int | None:
-    """Forget a site; returns its id."""
+    """Forget a site and all its scans; return its id, None where there is none."""
     site = tx.ledger.sites.get(site_name)
     if site is None:
         return None
@@ -154,10 +169,10 @@ def purge_portion(tx: Transaction) -> bool:
     return True
 
 
-def release_due(tx: Transaction, now: float) -> None:
+def release_due(tx: Transaction) -> None:
     """Release the scans that have waited long enough."""
     for site, robot in list(tx.ledger.waiting.values()):
-        tx.release_scans(site, robot, now)
+        tx.release_scans(site, robot)
 
 
 def record_skip(tx: Transaction, site_id: int, position: int, reason: str) -> Skip:
@@ -193,9 +208,8 @@ def append_events(tx: Transaction, site_id: int, batch: EventBatch, kept: int) -
     notify(tx.connection, f"events {site_id}")
 
 
-def save_view(connection: Connection, site_id: int, view: ViewRecord, term: int) -> None:
-    """Keep a site's view, in a transaction of its own, and tell the other processes."""
-    check_term(connection.execute(select(tables.clock.c.term)).scalar_one(), term)
+def save_view(connection: Connection, site_id: int, view: ViewRecord) -> None:
+    """Keep a site's view and tell the other processes."""
     values = {"position": view.position, "data": view.data}
     c = tables.views.c
     there = connection.execute(update(tables.views).where(c.site_id == site_id).values(values))
@@ -209,9 +223,3 @@ def begin_term(tx: Transaction) -> int:
     tx.connection.execute(update(tables.clock).values(term=tx.term + 1))
     drop_questions(tx.connection)
     return tx.term + 1
-
-
-def check_term(current: int, mine: int) -> None:
-    """Raise StoreError where another engine has taken over since."""
-    if current != mine:
-        raise StoreError("another mapping engine has taken over this database")

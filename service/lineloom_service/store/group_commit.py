@@ -177,15 +177,16 @@ class GroupCommit:
 
     def _act(self, connection: Connection, actions: list[Action[Any] | None]) -> _Outcome:
         clock = connection.execute(_LOCK_CLOCK).one()
-        records = self._ledger.catch_up(connection, clock.revision, time.monotonic())
-        tx = Transaction(connection, self._ledger, clock.term)
+        now = time.monotonic()
+        records = self._ledger.catch_up(connection, clock.revision, now)
+        tx = Transaction(connection, self._ledger, clock.term, now)
         results: list[Any] = []
         for action in actions:
             try:
                 results.append(None if action is None else action(tx))
             except (BacklogFullError, StoreError) as refusal:
                 results.append(refusal)
-        release_due(tx, time.monotonic())
+        release_due(tx)
         tx.flush()
         if self._ledger.revision != clock.revision:
             notify(connection, f"commit {self._ledger.revision}")

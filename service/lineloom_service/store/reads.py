@@ -14,6 +14,12 @@ def read_revision(connection: Connection) -> int:
     return revision
 
 
+def read_term(connection: Connection) -> int:
+    """Return the number of the engine that has the right to map."""
+    term: int = connection.execute(select(tables.clock.c.term)).scalar_one()
+    return term
+
+
 def read_feed(connection: Connection, site_id: int, after: int, limit: int) -> list[LogEntry]:
     """Return released entries after a position, in the order of the feed."""
     e = tables.entries.c

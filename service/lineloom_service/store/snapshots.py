@@ -7,10 +7,12 @@ is written once, and stays for as long as a kept snapshot needs it.
 from __future__ import annotations
 
 import zlib
+from collections.abc import AsyncIterator
 
 from sqlalchemy import Connection, and_, delete, func, insert, or_, select
 
 from lineloom_service.store import tables
+from lineloom_service.store.protocol import Store
 from lineloom_service.store.records import ChapterLostError, SnapshotRecord
 from lineloom_service.store.transaction import Transaction
 
@@ -86,6 +88,17 @@ def read_chapter(connection: Connection, site_id: int, producer: str, number: in
     if zlib.crc32(data) != row.crc:
         raise ChapterLostError(f"chapter {number} of its history is damaged")
     return data
+
+
+async def read_chapters(
+    store: Store, site_id: int, snapshot: SnapshotRecord
+) -> AsyncIterator[bytes]:
+    """Read the chapters that a snapshot goes on from, each when it is asked for.
+
+    Raises ChapterLostError where one is not there as it was saved.
+    """
+    for number in range(snapshot.end):
+        yield await store.read(read_chapter, site_id, snapshot.producer, number)
 
 
 def purge_chapters(connection: Connection, site_id: int) -> bool:

@@ -57,10 +57,10 @@ class SqliteDatabase:
 
     async def read(self, work: Work[T]) -> T:
         """Run work on a reader's thread."""
-        engine = reading(self._opened())
+        engine = self._opened()
 
         def run() -> T:
-            with engine.connect() as connection:
+            with reading(engine) as connection:
                 return work(connection)
 
         return await asyncio.get_running_loop().run_in_executor(self._readers, run)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +48,8 @@ def sqlite_engine(path: Path, *, foreign_keys: bool = True) -> Engine:
     return engine
 
 
-def reading(engine: Engine) -> Engine:
-    """Return the engine for transactions that only read: each sees one state, and blocks nobody."""
-    return engine.execution_options(**{_READS: True})
+@contextmanager
+def reading(engine: Engine) -> Iterator[Connection]:
+    """A connection for what only reads: one state of the tables, and nobody is blocked."""
+    with engine.connect() as connection:
+        yield connection.execution_options(**{_READS: True})

@@ -36,14 +36,15 @@ class Transaction:
     """Changes ledger and database together. Used by the writer's thread only.
 
     connection: within a database transaction that has locked the clock and that the caller
-    commits, after `flush`. term: the clock's. touched: the sites that changed, by id; gone: those
-    deleted.
+    commits, after `flush`. term: the clock's. now: when it began, monotonic [s]. touched: the
+    sites that changed, by id; gone: those deleted.
     """
 
-    def __init__(self, connection: Connection, ledger: Ledger, term: int) -> None:
+    def __init__(self, connection: Connection, ledger: Ledger, term: int, now: float) -> None:
         self.connection = connection
         self.ledger = ledger
         self.term = term
+        self.now = now
         self.touched: dict[int, SiteLedger] = {}
         self.gone: list[SiteLedger] = []
         self._counted_on = False
@@ -81,14 +82,12 @@ class Transaction:
             stream = robot.order.streams[session] = Stream(number, session)
         return stream
 
-    def add_scan(
-        self, site: SiteLedger, robot: RobotLedger, stream: Stream, scan: NewScan, now: float
-    ) -> None:
+    def add_scan(self, site: SiteLedger, robot: RobotLedger, stream: Stream, scan: NewScan) -> None:
         """Store a scan that is new; it has no place in the feed yet."""
         entry = self._add_entry(
             site, robot, "scan", stream_id=stream.id, seq=scan.seq, body=scan.body
         )
-        stream.hold(scan.seq, entry, now)
+        stream.hold(scan.seq, entry, self.now)
         site.accepted += 1
         site.held += 1
         self._streams[stream.id] = stream
@@ -100,12 +99,14 @@ class Transaction:
         entry = self._add_entry(site, robot, kind, stream_id=None, seq=None, body=body)
         self._place(site, [entry])
 
-    def release_scans(self, site: SiteLedger, robot: RobotLedger, now: float | None) -> None:
-        """Give the scans that need not wait any longer their places; all of them if now is None."""
+    def release_scans(
+        self, site: SiteLedger, robot: RobotLedger, *, all_held: bool = False
+    ) -> None:
+        """Give the scans that need not wait any longer their places; or all of them."""
         waiting = [stream for stream in robot.order.streams.values() if stream.held]
         if not waiting:
             return
-        entries = robot.order.flush() if now is None else robot.order.release(now)
+        entries = robot.order.flush() if all_held else robot.order.release(self.now)
         if entries:
             site.held -= len(entries)
             if robot.id in self._released:
