@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 
 from lineloom import wire
+from lineloom_core.check import Limit
 from lineloom_core.mapping.answers.evidence import Evidence, WhatIf
 from lineloom_core.mapping.answers.localisation import Localisation
 from lineloom_core.mapping.answers.site_view import ConstraintView
@@ -22,10 +24,7 @@ def to_detail(
     best = evidence.runner_up
     return wire.ConstraintDetail(
         **basis,
-        limits={
-            name: wire.CheckLimit(at_least=x.at_least, at_most=x.at_most, holds=x.holds)
-            for name, x in evidence.limits.items()
-        },
+        limits=_limits(evidence.limits),
         matched=[
             wire.MatchedLines(
                 reference=list(m.reference),
@@ -43,6 +42,10 @@ def to_detail(
         else wire.RunnerUp(x=best.x, y=best.y, theta=best.theta, evidence=best.evidence),
         margin=evidence.margin,
     )
+
+
+def _limits(limits: Mapping[str, Limit]) -> dict[str, wire.CheckLimit]:
+    return {name: wire.CheckLimit(**asdict(limit)) for name, limit in limits.items()}
 
 
 def to_what_if(found: WhatIf, version: int) -> wire.WhatIf:
@@ -86,6 +89,7 @@ def to_localization(site: str, found: Localisation) -> wire.LocalizeAnswer:
                 covariance=matrix(h.covariance),
                 score=h.score,
                 checks=figures(h.checks),
+                limits=_limits(h.limits),
             )
             for h in found.hypotheses
         ],

@@ -26,7 +26,9 @@ async def url(client: httpx.AsyncClient, make_scan: Make, idle: Idle, site: str)
 
 async def test_evidence_comes_with_a_constraint(client: httpx.AsyncClient, url: str) -> None:
     found = (await client.get(f"{url}/k0-1")).json()
-    assert found["limits"] == {"conflict": {"at_least": None, "at_most": 0.1, "holds": True}}
+    limit: dict[str, Any] = {"at_least": None, "at_most": 0.1, "holds": True}
+    limit |= {"means": "Points in free space", "unit": "share"}
+    assert found["limits"] == {"conflict": limit}
     assert found["matched"][0]["current"] == [0.0, 0.0, 1.0, 0.1]
     assert found["conflicts"] == [[0.5, 0.5]]
     assert found["runner_up"] == {"x": 1.0, "y": 2.0, "theta": 0.5, "evidence": 3.0}
@@ -39,7 +41,7 @@ async def test_evidence_as_a_drawing(client: httpx.AsyncClient, url: str) -> Non
     assert response.status_code == 200
     assert response.headers["content-type"].startswith("image/svg+xml")
     assert "1 taken for one wall" in response.text
-    assert "conflict: 0.02" in response.text
+    assert "Points in free space: 2.0%  (≤ 10.0%)" in response.text
 
 
 async def test_a_constraint_is_shown_also_where_its_evidence_cannot_be_had(

@@ -5,12 +5,13 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 import typer
 from lineloom.cli.app import app as command_line
+from lineloom_core.check import Checks
+from lineloom_core.checks import DOUBTED, JOINED, RECOGNISED, WIDE_LOOP
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_service.app import create_app
 from lineloom_service.errors import KINDS
@@ -48,19 +49,6 @@ def metric_names() -> list[str]:
     metrics.watch(lambda: [], Durations, Histogram(), lambda: [])
     suffix = {"counter": "_total", "info": "_info"}
     return [f"{f.name}{suffix.get(f.type, '')}" for f in metrics.registry.collect()]
-
-
-def texts_of(path: Path, function: str) -> list[str]:
-    """The texts that a function returns, of one with figures what comes before the first."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    found = next(n for n in ast.walk(tree) if getattr(n, "name", None) == function)
-    texts = []
-    for node in ast.walk(found):
-        if isinstance(node, ast.Return):
-            value = node.value.values[0] if isinstance(node.value, ast.JoinedStr) else node.value
-            if isinstance(value, ast.Constant) and value.value:
-                texts.append(str(value.value))
-    return texts
 
 
 def finding_names() -> set[str]:
@@ -128,32 +116,14 @@ def test_every_finding_of_the_sensor_doctor() -> None:
 
 
 @pytest.mark.parametrize(
-    ("module", "function"),
-    [
-        ("mapping/merging/joining.py", "_objection_to_set"),
-        ("mapping/merging/overlap.py", "objection"),
-        ("places/recognition.py", "_objection"),
-    ],
+    "checks", [RECOGNISED, WIDE_LOOP, JOINED, DOUBTED], ids=lambda c: c.section
 )
-def test_every_reason_to_wait(module: str, function: str) -> None:
-    reasons = texts_of(CORE / module, function)
-    assert len(reasons) >= 3, "the search for reasons is broken"
+def test_every_reason(checks: Checks) -> None:
+    """Why a candidate waits, is rejected or is withdrawn: as it says, up to its figure."""
     page = " ".join((ROOT / "core" / "docs" / "concepts.md").read_text(encoding="utf-8").split())
-    assert [reason for reason in reasons if reason.strip() not in page] == []
-
-
-def test_every_reason_to_withdraw() -> None:
-    source = (CORE / "mapping" / "merging" / "contradictions.py").read_text(encoding="utf-8")
-    reasons = {
-        node.value.rstrip(" ,")
-        for node in ast.walk(ast.parse(source))
-        if isinstance(node, ast.Constant)
-        and isinstance(node.value, str)
-        and node.value.startswith("withdrawn:")
-    }
-    assert len(reasons) >= 3, "the search for reasons is broken"
-    page = " ".join((ROOT / "core" / "docs" / "concepts.md").read_text(encoding="utf-8").split())
-    assert sorted(reason for reason in reasons if reason not in page) == []
+    texts = [r.objection.replace("{0:.1%}", "|").split("|") for r in checks.rows if r.objection]
+    reasons = [next(part.strip(" (),") for part in text if part) for text in texts]
+    assert [reason for reason in reasons if reason not in page] == []
 
 
 def test_the_parameters_of_the_tuning_guide_are_the_mapper_s() -> None:

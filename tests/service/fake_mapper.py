@@ -19,11 +19,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from lineloom_core.check import Limit
 from lineloom_core.fusion.occupancy import Rays
 from lineloom_core.geometry import Pose
 from lineloom_core.mapping.answers.evidence import (
     Evidence,
-    Limit,
     MatchedLines,
     RobotMove,
     RunnerUp,
@@ -129,7 +129,7 @@ class FakeMapper:
             raise ValueError("there is nothing to say")
         return Evidence(
             constraint=constraint,
-            limits={"conflict": Limit(None, 0.1, True)},
+            limits={"conflict": Limit(None, 0.1, True, "Points in free space", "share")},
             matched=(MatchedLines((0, 0, 1, 0), (0, 0, 1, 0.1), 1.0, 0.05, 0.1),),
             reference=np.array([[0.0, 0.0, 1.0, 0.0]]),
             current=np.array([[0.0, 0.0, 1.0, 0.1]]),

@@ -236,8 +236,18 @@ def evidence(constraint: dict[str, Any]) -> dict[str, Any]:
     share = constraint["checks"]["conflict_share"]
     return constraint | {
         "limits": {
-            "overlap": {"at_least": 3.0, "at_most": None, "holds": True},
-            "conflict_share": {"at_least": None, "at_most": 0.12, "holds": share <= 0.12},
+            "overlap": {
+                **{"at_least": 3.0, "at_most": None, "holds": True},
+                **{"means": "Common wall", "unit": "m"},
+            },
+            "conflict_share": {
+                **{"at_least": None, "at_most": 0.12, "holds": share <= 0.12},
+                **{"means": "Share in free space", "unit": "share"},
+            },
+            "margin": {
+                **{"at_least": None, "at_most": None, "holds": True},
+                **{"means": "Margin to runner-up", "unit": "share"},
+            },
         },
         "matched": [
             {

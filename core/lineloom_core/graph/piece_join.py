@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lineloom_core.geometry import Pose, se2
+from lineloom_core.graph.consistency import CHI2_99
 from lineloom_core.graph.edge import Edge
+from lineloom_core.graph.normal_equations import CAUCHY_K
 
-_CHI2_CAP = 11.345  # 99 % of chi-squared with 3 degrees of freedom: beyond it all is equally wrong
-_CAUCHY_K = 3.0
 _REFINEMENTS = 10
 
 
@@ -21,8 +21,8 @@ def rigid_join(
     """Return T_A_B that carries piece b into the frame of piece a so that the edges fit best.
 
     Each edge must lead from one piece to the other, either way round. Starts from the edge whose
-    own answer the others contradict least (truncated chi-squared), then refines over all edges
-    under a Cauchy kernel, the pieces staying rigid.
+    own answer the others contradict least (beyond 99 % of chi-squared all is equally wrong), then
+    refines over all edges under a Cauchy kernel, the pieces staying rigid.
 
     Raises ValueError without edges, or for an edge that does not lead across.
     """
@@ -30,13 +30,13 @@ def rigid_join(
         raise ValueError("no edge joins the two pieces")
     P, Z, Q, W = _across(piece_a, piece_b, sorted(edges, key=lambda e: (e.node_a, e.node_b, e.id)))
     proposals = se2.compose(se2.compose(P, Z), se2.inverse(Q))
-    misfits = [float(np.minimum(_chi2(P, Z, Q, W, T), _CHI2_CAP).sum()) for T in proposals]
+    misfits = [float(np.minimum(_chi2(P, Z, Q, W, T), CHI2_99).sum()) for T in proposals]
     T = proposals[int(np.argmin(misfits))]
     for _ in range(_REFINEMENTS):
         # error = Log(Z^-1 P^-1 T Q); moving T by Exp(xi) on the right moves it by Ad(Q^-1) xi.
         error = se2.log(se2.between(Z, se2.compose(se2.between(P, T), Q)))
         J = se2.adjoint(se2.inverse(Q))
-        w = _CAUCHY_K**2 / (_CAUCHY_K**2 + _chi2(P, Z, Q, W, T))
+        w = CAUCHY_K**2 / (CAUCHY_K**2 + _chi2(P, Z, Q, W, T))
         J_T_W = np.swapaxes(J, 1, 2) @ (W * w[:, None, None])
         H = (J_T_W @ J).sum(axis=0)
         g = (J_T_W @ error[:, :, None]).sum(axis=0)[:, 0]

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.check import Limit
 from lineloom_core.io.drawing import FRAME, INK, MUTED, Box, Disc, Drawing, Label, Mark, Strokes
-from lineloom_core.mapping.answers.evidence import Evidence, Limit
+from lineloom_core.mapping.answers.evidence import Evidence
 from lineloom_core.mapping.answers.site_view import ConstraintView
 
 REFERENCE, CURRENT, CONFLICT, MATCHED = "#0072b2", "#d55e00", "#c81e1e", "#009e73"
@@ -16,6 +17,7 @@ _PICTURE = 720.0  # px: the square on the left
 _PAD = 24.0
 _ROW = 22.0
 _FONT = 14.0
+_NAMELESS = Limit(None, None, True)
 
 
 def draw_evidence(constraint: ConstraintView, evidence: Evidence) -> Drawing:
@@ -92,10 +94,9 @@ def _figures(constraint: ConstraintView, evidence: Evidence) -> list[Mark]:
     ]
     y += 4.0 * _ROW
     for name, value in constraint.checks.items():
-        limit = evidence.limits.get(name)
-        bad = limit is not None and not limit.holds
-        text = f"{name.replace('_', ' ')}: {value:.3g}{_bound(limit)}"
-        marks.append(Label(x, y, text, _FONT, CONFLICT if bad else INK))
+        limit = evidence.limits.get(name, _NAMELESS)
+        text = f"{limit.means or name}: {_written(value, limit)}{_bound(limit)}"
+        marks.append(Label(x, y, text, _FONT, INK if limit.holds else CONFLICT))
         y += _ROW
     if evidence.votes is not None:
         marks.append(Label(x, y, f"votes: {evidence.votes:.3g} m of line", _FONT, INK))
@@ -106,15 +107,17 @@ def _figures(constraint: ConstraintView, evidence: Evidence) -> list[Mark]:
     return marks
 
 
-def _bound(limit: Limit | None) -> str:
-    if limit is None:
-        return ""
-    parts = []
-    if limit.at_least is not None:
-        parts.append(f"at least {limit.at_least:.3g}")
-    if limit.at_most is not None:
-        parts.append(f"at most {limit.at_most:.3g}")
-    return f"  ({', '.join(parts)})"
+def _written(value: float, limit: Limit) -> str:
+    if limit.unit == "share":
+        return f"{value:.1%}"
+    unit = "" if len(limit.unit) > 4 else limit.unit  # what is counted is in the words
+    return f"{value:.3g} {unit}".rstrip()
+
+
+def _bound(limit: Limit) -> str:
+    bounds = (("≥", limit.at_least), ("≤", limit.at_most))
+    parts = [f"{way} {_written(bound, limit)}" for way, bound in bounds if bound is not None]
+    return f"  ({', '.join(parts)})" if parts else ""
 
 
 def _shortened(text: str) -> str:

@@ -73,7 +73,7 @@ class TrackerConfig:
 @storable("place-config")
 @dataclass(frozen=True, slots=True)
 class PlaceConfig:
-    """Places: the submaps that are recognised."""
+    """Places, which are recognised."""
 
     span: float = parameter(5.0, "m", "of way in a place", 0.1)
     stride: float = parameter(2.5, "m", "how far apart places begin", 0.1)
@@ -85,7 +85,7 @@ class PlaceConfig:
 @storable("near-loop-config")
 @dataclass(frozen=True, slots=True)
 class NearLoopConfig:
-    """Closing loops where the graph already knows that two keyframes are near each other."""
+    """Loops where the graph already knows that two keyframes are near each other."""
 
     radius: float = parameter(2.5, "m", "how near")
     angle: float = parameter(math.radians(70.0), "rad", "how much turned")
@@ -97,12 +97,29 @@ class NearLoopConfig:
     every: int = parameter(2, "keyframes", "from one that is looked at to the next", 1)
 
 
+@storable("wide-loop-config")
+@dataclass(frozen=True, slots=True)
+class WideLoopConfig:
+    """Loops that come of recognising a place in its own component.
+
+    One that corrects the graph by less than small_step and small_turn needs no other.
+    """
+
+    most_sigmas: float = parameter(3.0, "σ", "of drift that a loop may correct", 0.01)
+    least_agreeing: int = parameter(1, "constraints", "others that correct the graph alike")
+    slack: float = parameter(0.3, "m", "between two that do, besides the drift in between")
+    turn: float = parameter(0.1, "rad", "between two that do")
+    small_step: float = parameter(0.5, "m", "a correction that needs no other")
+    small_turn: float = parameter(0.08, "rad", "a correction that needs no other")
+
+
 @storable("join-config")
 @dataclass(frozen=True, slots=True)
 class JoinConfig:
     """Believing a set of candidate constraints, which joins two components."""
 
     least_set: int = parameter(3, "constraints", "mutually consistent ones in the set", 1)
+    least_set_places: int = parameter(2, "places", "of either component in the set", 1)
     least_places: int = parameter(
         3, "places", "in each component, so that it is known what else looks alike"
     )
@@ -127,7 +144,6 @@ class JoinConfig:
     rigid_within: float = parameter(
         0.1, "m", "places count for `most_map_missing` that drift has moved less against the set"
     )
-    loop_gate: float = parameter(3.0, "sigma", "of drift within which a loop is believed")
     most_candidates: int = parameter(64, "constraints", "that sets are made of", 1, 4096)
 
 
@@ -201,7 +217,7 @@ class LocaliseConfig:
     most_conflict: float = parameter(0.15, "share", "that may contradict")
     least_margin: float = parameter(0.15, "share", "of its evidence that the best one leads by")
     least_information: float = parameter(
-        2.0e3, "1/m^2", "the least on the translation, as in recognition"
+        2.0e3, "1/m²", "the least on the translation, as in recognition"
     )
     least_places: int = parameter(
         3, "places", "in the component and its neighbours, to know what else looks alike"
@@ -219,6 +235,7 @@ class MapperConfig:
     places: PlaceConfig = field(default_factory=PlaceConfig)
     recognition: RecognitionConfig = field(default_factory=RecognitionConfig)
     near_loops: NearLoopConfig = field(default_factory=NearLoopConfig)
+    wide_loops: WideLoopConfig = field(default_factory=WideLoopConfig)
     join: JoinConfig = field(default_factory=JoinConfig)
     doubt: DoubtConfig = field(default_factory=DoubtConfig)
     thinning: ThinningConfig = field(default_factory=ThinningConfig)

@@ -2,6 +2,7 @@
 
 from lineloom_core.places.index import PlaceIndex
 from lineloom_core.places.place import (
+    PLACE_GATE,
     Glimpse,
     Place,
     Seen,
@@ -25,6 +26,7 @@ from lineloom_core.places.recognition import (
 )
 
 __all__ = [
+    "PLACE_GATE",
     "Glimpse",
     "Place",
     "PlaceIndex",

@@ -24,8 +24,13 @@ from lineloom_core.geometry import Pose
 from lineloom_core.lately import UsedLately
 from lineloom_core.matching._free_space_kernels import CONFLICT, judge_cloud
 from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
-from lineloom_core.matching.local_map import Cloud, LocalMap
+from lineloom_core.matching.local_map import Cloud, LocalMap, Registration
 from lineloom_core.places import _kernels
+
+PLACE_GATE = 0.3
+"""How far from where they are expected points may be found in another place [m]."""
+
+_SIGMA = 0.04  # m: of averaged points that drift has moved against each other
 
 _CORNER_REACH = 0.15
 
@@ -133,6 +138,10 @@ class Place:
     def local_map(self) -> LocalMap:
         """The averaged points, to register against."""
         return _body(self).local_map
+
+    def register(self, other: Place, T: Pose) -> Registration:
+        """Refine T_self_other on the averaged points, from which drift may have moved it."""
+        return self.local_map.register(other.surface, T, gate=PLACE_GATE, sigma=_SIGMA)
 
     @property
     def ranges(self) -> NDArray[np.float64]:

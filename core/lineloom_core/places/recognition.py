@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.checks import RECOGNISED
 from lineloom_core.codec import storable
 from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.graph.observability import observe
@@ -52,7 +53,7 @@ class RecognitionConfig:
         0.15, "share", "of its evidence that the best hypothesis leads the best rival by"
     )
     least_information: float = parameter(
-        6.0e3, "1/m^2", "the least on the translation, points scaled as `Registration` does"
+        6.0e3, "1/m²", "the least on the translation, points scaled as `Registration` does"
     )
     rival_distance: float = parameter(0.5, "m", "from which on a hypothesis is a rival")
     rival_angle: float = parameter(0.15, "rad", "from which on a hypothesis is a rival")
@@ -90,9 +91,7 @@ def recognise(
         return NOTHING_IN_COMMON
     if _kernels.place_evidence(table[0, 5], table[0, 6], table[0, 9]) < config.least_overlap:
         return NOTHING_IN_COMMON
-    registered = reference.local_map.register(
-        current.surface, Pose.from_array(table[0, :3]), gate=0.3, sigma=0.04
-    )
+    registered = reference.register(current, Pose.from_array(table[0, :3]))
     checks = check_alignment(reference, current, registered)
     checks["overlap"] = float(table[0, 9])
     evidence = _kernels.place_evidence(checks["matched"], checks["conflict"], table[0, 9])
@@ -100,11 +99,10 @@ def recognise(
     rival = evidence_elsewhere(table, registered.pose, config)
     checks["margin"] = 1.0 - rival / evidence if evidence > 0.0 else 0.0
     checks["own_conflict"] = reference.own_conflict + current.own_conflict
-    reason = _objection(checks, config)
+    reason = RECOGNISED.objection(config, checks)
     if not reason:
         checks["missing_share"] = missing_share(*count_steady(reference, current, registered.pose))
-        if checks["missing_share"] > config.most_missing:
-            reason = "what stood still in one place is missing in the other"
+        reason = RECOGNISED.objection(config, checks)
     return Recognition(
         plausible=reason == "",
         T_reference_current=registered.pose,
@@ -180,18 +178,3 @@ def evidence_elsewhere(
     """Evidence of the best hypothesis that is another relative pose than `pose`."""
     _, others = rivals(table, pose, config, slack=slack)
     return max((evidence_of(row) for row in others), default=0.0)
-
-
-def _objection(checks: dict[str, float], config: RecognitionConfig) -> str:
-    """The first check that fails, in words; empty where all pass."""
-    if checks["matched"] < config.least_matched:
-        return "too few points in common"
-    if checks["overlap"] < config.least_overlap:
-        return "too little common line length"
-    if checks["conflict_share"] > config.most_conflict + checks["own_conflict"]:
-        return "walls of one place stand in free space of the other"
-    if checks["margin"] < config.least_margin:
-        return "another hypothesis fits almost as well"
-    if checks["information"] < config.least_information:
-        return "the position along one direction is not determined"
-    return ""

@@ -115,5 +115,5 @@ def test_the_drawing_shows_both_places_and_every_figure(mapper: SiteMapper) -> N
     c, evidence = explained(mapper, "p", "accepted")[0]
     text = to_svg(draw_evidence(c, evidence))
     for name in c.checks:
-        assert name.replace("_", " ") in text
+        assert evidence.limits[name].means in text
     assert text.count("<path") == 2 + len(evidence.matched)

@@ -9,11 +9,16 @@ from lineloom.wire.constraint import Constraint
 
 
 class CheckLimit(Answer):
-    """What a figure in `checks` is held to."""
+    """What a figure in `checks` is held to, and what it is; without bounds it is only shown.
+
+    means: in words. unit: `share` is 0 to 1, empty is a plain number.
+    """
 
     at_least: float | None
     at_most: float | None
     holds: bool
+    means: str = ""
+    unit: str = ""
 
 
 class MatchedLines(Answer):

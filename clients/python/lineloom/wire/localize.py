@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from lineloom.wire.base import Answer, Covariance, Request
+from lineloom.wire.evidence import CheckLimit
 from lineloom.wire.match import MatchScan
 
 LocalizeVerdict = Literal["unique", "ambiguous", "unknown"]
@@ -25,6 +26,7 @@ class LocalizeHypothesis(Answer):
     """Where the scan may have been taken: pose of the laser in the component's `map` frame.
 
     covariance: of the scan against the map around it. score: how sure, 0 to 1, that it is right.
+    limits: by check, what its figure is held to.
     """
 
     component: str
@@ -34,6 +36,7 @@ class LocalizeHypothesis(Answer):
     covariance: Covariance
     score: float
     checks: dict[str, float | None]
+    limits: dict[str, CheckLimit] = Field(default_factory=dict)
 
 
 class LocalizeAnswer(Answer):

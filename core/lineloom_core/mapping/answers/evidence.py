@@ -8,6 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.check import Limit
+
 Action = Literal["retract", "restore"]
 
 
@@ -35,15 +37,6 @@ class WhatIf:
     components_before: dict[str, tuple[str, ...]]
     components_after: dict[str, tuple[str, ...]]
     robots: tuple[RobotMove, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Limit:
-    """What a check's figure is held to."""
-
-    at_least: float | None
-    at_most: float | None
-    holds: bool
 
 
 @dataclass(frozen=True, eq=False, slots=True)

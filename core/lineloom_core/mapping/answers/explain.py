@@ -12,12 +12,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.check import Limit
+from lineloom_core.checks import DOUBTED, JOINED, NEAR_LOOP, RECOGNISED, TRACKED, WIDE_LOOP
 from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.mapping.answers.evidence import Evidence, MatchedLines, RunnerUp
-from lineloom_core.mapping.answers.limits import limits_of
 from lineloom_core.mapping.belief.constraint import Constraint
 from lineloom_core.mapping.belief.place_making import make_place
 from lineloom_core.mapping.belief.site_map import SiteMap
+from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.facts.history import History
 from lineloom_core.places import Place, conflicting_points, evidence_of, rivals
 
@@ -36,7 +38,7 @@ def explain(site: SiteMap, history: History, constraint: Constraint) -> Evidence
     votes, runner_up, margin = _rivals(site, constraint, T_a_reference, T_b_current)
     return Evidence(
         constraint=constraint.id,
-        limits=limits_of(constraint, site.config),
+        limits=_limits(constraint, site.config),
         matched=_matched(lines_a, lines_b),
         reference=lines_a,
         current=lines_b,
@@ -56,6 +58,15 @@ def _seen_by(site: SiteMap, history: History, place: int, keyframe: int) -> tupl
     if known is not None and keyframe in known.keyframes:
         return known, known.poses[known.keyframes.index(keyframe)].inverse()
     return make_place((keyframe,), history), Pose.identity()
+
+
+def _limits(c: Constraint, config: MapperConfig) -> dict[str, Limit]:
+    """What every figure was held to, for the way in which the constraint came about."""
+    ways = {"sequential": (TRACKED,)}.get(c.kind, (NEAR_LOOP,))
+    limits: dict[str, Limit] = {}
+    for checks in (*(ways if c.place_a < 0 else (RECOGNISED, WIDE_LOOP, JOINED)), DOUBTED):
+        limits |= checks.limits(getattr(config, checks.section), c.checks)
+    return limits
 
 
 def _moved(T: Pose, place: Place) -> NDArray[np.float64]:

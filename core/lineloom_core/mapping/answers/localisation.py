@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.check import Limit
 from lineloom_core.geometry import Pose
 
 LocalisationVerdict = Literal["unique", "ambiguous", "unknown"]
@@ -19,7 +20,7 @@ class PoseHypothesis:
 
     pose: T_map_laser in the component's map frame. covariance: (3, 3) over x, y, theta in the
     map's axes, of the scan against the map around it: the map's own uncertainty is not in it.
-    score: how sure, 0..1, that it is right. checks: figure by name.
+    score: how sure, 0..1, that it is right. checks: figure by name; limits: what each is held to.
     """
 
     component: str
@@ -27,6 +28,7 @@ class PoseHypothesis:
     covariance: NDArray[np.float64]
     score: float
     checks: dict[str, float]
+    limits: dict[str, Limit] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.checks import LOCALISED
 from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.mapping.answers.localisation import (
     Localisation,
@@ -105,7 +106,7 @@ def _check(
         site, spot.place.anchor, spot.pose, radius=config.surround, most=config.most_keyframes
     )
     guess = T_map_around.between(spot.pose)
-    registered = around.local_map.register(query.surface, guess, gate=0.3, sigma=0.04)
+    registered = around.register(query, guess)
     if registered.pose.distance(guess) > config.same_distance:
         return None  # it slid to another spot, which stands in the list by itself if it is one
     checks = check_alignment(around, query, registered)
@@ -141,7 +142,8 @@ def _ranked(checked: list[PoseHypothesis], config: LocaliseConfig) -> list[PoseH
     for h in kept:
         rival = max((o.checks["evidence"] for o in kept if o is not h), default=0.0)
         checks = {**h.checks, "margin": 1.0 - rival / h.checks["evidence"]}
-        ranked.append(replace(h, checks=checks, score=probability(checks)))
+        limits = LOCALISED.limits(config, checks)
+        ranked.append(replace(h, checks=checks, limits=limits, score=probability(checks)))
     return ranked
 
 
@@ -150,17 +152,10 @@ def _verdict(
 ) -> tuple[LocalisationVerdict, str]:
     if not ranked:
         return "unknown", "nothing in the map looks like it"
-    best = ranked[0].checks
-    if best["matched"] < config.least_matched or best["explained"] < config.least_explained:
-        return "unknown", "too little of what was seen is known"
-    if best["conflict_share"] > config.most_conflict + best["own_conflict"]:
-        return "unknown", "even where it fits best, free space contradicts it"
-    if best["margin"] < config.least_margin:
-        return "ambiguous", "another spot fits almost as well"
-    if best["information"] < config.least_information:
-        return "ambiguous", "the position along one direction is not determined"
-    if best["places"] < config.least_places:
-        return "ambiguous", "too little of the building is known to tell what else looks like it"
+    row = LOCALISED.against(config, ranked[0].checks)
+    if row is not None:
+        known = row.name not in ("matched", "explained", "conflict_share")
+        return "ambiguous" if known else "unknown", row.objection
     if ranked[0].score < config.least_score:
         return "unknown", f"the best fit is right with a probability of only {ranked[0].score:.2f}"
     return "unique", "it fits here and nowhere else"

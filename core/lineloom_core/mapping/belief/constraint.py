@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -68,6 +69,10 @@ class Constraint:
             consistency_set=consistency_set or self.consistency_set,
             history=(*before, replace(move, version=self.history[-1].version) if same else move),
         )
+
+    def with_figures(self, figures: Mapping[str, float]) -> Constraint:
+        """The same constraint, showing these as well."""
+        return replace(self, checks={**self.checks, **figures})
 
     def edge(self) -> Edge:
         """The constraint as the solver takes it."""

@@ -175,7 +175,7 @@ def _step(history: History, record: RobotRecord, tracked: Tracked) -> Step | Non
         T_previous_this=last.T_track_laser.between(tracked.pose),
         information=step_information(np.asarray(tracked.information), _STEP_PRIOR),
         drift=step_drift(tracked.information, tracked.noise),
-        checks={"fit": tracked.fit, "conflict_share": tracked.conflict},
+        checks=tracked.checks,
     )
 
 

@@ -20,12 +20,13 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.checks import TRACKED
 from lineloom_core.codec import storable
 from lineloom_core.features import ScanFeatures
 from lineloom_core.geometry import Pose
@@ -56,8 +57,7 @@ class Tracked:
     pose: Pose | None
     is_keyframe: bool
     information: NDArray[np.float64]
-    fit: float
-    conflict: float
+    checks: dict[str, float] = field(default_factory=dict)
     noise: float = 1.0
     """The robot's noise figure so far (see `drift`)."""
 
@@ -110,7 +110,7 @@ class Tracker:
         if not len(self._recent):
             self._accept(Pose.identity(), stamp, odometry)
             self._add_keyframe(features, cloud)
-            return Tracked("first", self._pose, True, np.zeros((3, 3)), 1.0, 0.0)
+            return Tracked("first", self._pose, True, np.zeros((3, 3)))
         if stamp - self._stamp > self._config.longest_silence:
             return _nowhere("lost")
         rolled = self._rolled(stamp, odometry)
@@ -123,21 +123,24 @@ class Tracker:
         # Wheels know the way along a plain corridor; elsewhere velocity has less of a bias.
         due = predictions[-1] if not trusted or unseen is not None else predictions[-2]
         found = self._held(found, due, stamp - self._stamp)
-        conflict = self._conflict(features, found.pose)
-        if self._is_hope(found, conflict, stamp - self._stamp):
+        checks = {
+            "fit": found.fit,
+            "conflict_share": self._conflict(features, found.pose),
+            "gap_s": stamp - self._stamp,
+            "noise": self._noise.value,
+        }
+        if TRACKED.against(self._config, checks):
             self._misses += 1
             status: Status = "lost" if self._misses >= self._config.patience else "skipped"
-            return _nowhere(status, found.fit, conflict)
+            return _nowhere(status, checks)
         self._misses = 0
         self._accept(found.pose, stamp, odometry)
-        moved_on = self._moved_on(found, conflict)
+        moved_on = self._moved_on(found, checks["conflict_share"])
         if moved_on:
             self._measure_noise(cloud, found.pose)
             self._add_keyframe(features, cloud)
         information = _in_own_axes(found)
-        return Tracked(
-            "tracked", found.pose, moved_on, information, found.fit, conflict, self._noise.value
-        )
+        return Tracked("tracked", found.pose, moved_on, information, checks, self._noise.value)
 
     def _moved_on(self, found: Registration, conflict: float) -> bool:
         """Whether the scan is to be a keyframe."""
@@ -148,17 +151,6 @@ class Tracker:
             or found.fit < config.enough_fit
             or conflict > config.new_conflict
         )
-
-    def _is_hope(self, found: Registration, conflict: float, elapsed: float) -> bool:
-        """Whether the scan cannot be said to lie where it fits best.
-
-        After a while without any, the robot may be anywhere nearby: the scan must fit well.
-        """
-        config = self._config
-        if elapsed > config.longest_gap:
-            return found.fit < config.gap_fit or conflict > config.gap_conflict
-        most = config.noisy_conflict if self._is_noisy else config.most_conflict
-        return found.fit < config.least_fit or conflict > most
 
     @property
     def _is_noisy(self) -> bool:
@@ -265,8 +257,8 @@ class Tracker:
         self._recent.add(features, cloud, self._pose, depth=depth)
 
 
-def _nowhere(status: Status, fit: float = 0.0, conflict: float = 0.0) -> Tracked:
-    return Tracked(status, None, False, np.zeros((3, 3)), fit, conflict)
+def _nowhere(status: Status, checks: dict[str, float] | None = None) -> Tracked:
+    return Tracked(status, None, False, np.zeros((3, 3)), checks or {})
 
 
 def _unobserved(found: Registration, least: float) -> float | None:

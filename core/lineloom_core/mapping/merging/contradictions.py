@@ -18,6 +18,7 @@ from lineloom_core.mapping.belief.constraint import Constraint, step_id
 from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.merging.jumps import jump
 from lineloom_core.mapping.merging.overlap import count_steady_nearby, usual_missing
+from lineloom_core.mapping.merging.withdrawal import is_doubted, withdrawn
 from lineloom_core.places import Place, count_steady, missing_share
 
 TrackPair = tuple[str, str]
@@ -77,7 +78,8 @@ def _slip(
     if share <= config.place_right:
         track.right_until, track.wrong_since = place.id, 0
         return None
-    if share < config.place_wrong or track.right_until is None:
+    figures = {"slip_missing": share}
+    if track.right_until is None or not is_doubted(site, figures):
         return None
     track.wrong_since += 1
     if track.wrong_since < config.wrong_in_a_row:
@@ -92,8 +94,7 @@ def _slip(
     if not steps:
         return None
     weakest = min(steps, key=lambda c: float(np.linalg.eigvalsh(c.information[:2, :2])[0]))
-    reason = f"withdrawn: tracking slipped hereabouts, {share:.1%} of what stood still is missing"
-    return weakest.moved_to("retracted", reason, site.now)
+    return withdrawn(site, weakest, figures)
 
 
 def _held_against(site: SiteMap, older: Place, newer: Place) -> tuple[int, int]:
@@ -117,13 +118,13 @@ def _false_meeting(site: SiteMap, pair: TrackPair) -> tuple[Constraint, ...]:
     if compared < config.least_compared or matched + missing < config.least_points:
         return ()
     share = missing_share(matched, missing)
-    if share <= config.most_missing:
+    if not is_doubted(site, {"pair_missing": share}):
         return ()
     share -= usual_missing(site, [p for p in site.places.values() if _on(site, p, pair)])
-    if share <= config.most_missing:
+    figures = {"pair_missing": share}
+    if not is_doubted(site, figures):
         return ()
-    reason = f"withdrawn: {share:.1%} of what stood still for one is missing for the other"
-    return tuple(c.moved_to("retracted", reason, site.now) for c in _weakest_meeting(site, *pair))
+    return tuple(withdrawn(site, c, figures) for c in _weakest_meeting(site, *pair))
 
 
 def _on(site: SiteMap, place: Place, pair: TrackPair) -> bool:
@@ -157,14 +158,13 @@ def _strained(site: SiteMap, place: Place) -> tuple[Constraint, ...]:
     if site.unsolved.get(root):
         return ()
     errors, config = site.graph.errors(), site.config.doubt
-    strained = (np.hypot(errors[:, 0], errors[:, 1]) > config.most_strain) | (
-        np.abs(errors[:, 2]) > config.most_turn
-    )
-    reason = "withdrawn: the graph contradicts it"
+    off, turned = np.hypot(errors[:, 0], errors[:, 1]).tolist(), np.abs(errors[:, 2]).tolist()
+    edges = zip(site.graph.edges.values(), off, turned, strict=True)
     return tuple(
-        site.constraints[edge.id].moved_to("retracted", reason, site.now)
-        for edge in itertools.compress(site.graph.edges.values(), strained)
+        withdrawn(site, site.constraints[edge.id], {"strain_m": m, "strain_rad": rad})
+        for edge, m, rad in edges
         if edge.kind == "loop"
+        and (m > config.most_strain or rad > config.most_turn)  # as `DOUBTED`, for all loops fast
         and edge.id not in site.verdicts.approved
         and site.component_root(edge.node_a) == root
     )

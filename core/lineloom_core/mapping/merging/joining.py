@@ -10,11 +10,11 @@ they would overlap; 6. accept, join, optimise.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from itertools import islice
 
 import numpy as np
 
+from lineloom_core.checks import JOINED
 from lineloom_core.geometry import Pose
 from lineloom_core.graph import consistent_sets, pairwise_consistent, rigid_join, settle, together
 from lineloom_core.mapping.belief.constraint import CONSTRAINT_FLOOR, Constraint, turned_round
@@ -22,7 +22,7 @@ from lineloom_core.mapping.belief.refusals import refuse_barred
 from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.merging.component_merged import ComponentMerged
 from lineloom_core.mapping.merging.distinctive import is_distinctive
-from lineloom_core.mapping.merging.overlap import Overlap, overlap_of_sets
+from lineloom_core.mapping.merging.overlap import overlap_of_sets
 
 
 def join(site: SiteMap, root: int, keyframe: int) -> ComponentMerged | None:
@@ -31,17 +31,18 @@ def join(site: SiteMap, root: int, keyframe: int) -> ComponentMerged | None:
     a_root, b_root = min(root, other_root), max(root, other_root)
     candidates = refuse_barred(site, _candidates_between(site, a_root, b_root))
     chosen, rival = _best_sets(site, candidates)
-    objection = _objection_to_set(site, chosen, rival)
-    if objection:
+    config, figures = site.config.join, _figures(site, chosen, rival)
+    if chosen and not JOINED.against(config, figures):
+        figures["set_distinctive"] = float(_distinctive(site, chosen))
+    if objection := JOINED.objection(config, figures):
         _wait(site, candidates, objection)
         return None
     T_A_B, together = _solved_together(site, a_root, b_root, chosen)
-    overlap = overlap_of_sets(site, chosen, together)
-    objection = overlap.objection(site.config.join)
-    if objection:
+    figures |= overlap_of_sets(site, chosen, together)
+    if objection := JOINED.objection(config, figures):
         _wait(site, chosen, objection)
         return None
-    merged = _accept(site, chosen, b_root, T_A_B, _figures(site, chosen, rival, overlap))
+    merged = _accept(site, chosen, b_root, T_A_B, figures)
     _drop_others(site, candidates, chosen)
     site.optimise(a_root)
     return merged
@@ -60,23 +61,21 @@ def _accept(
         accepted = constraint.moved_to(
             "accepted", f"{len(ids)} constraints agree", site.now, consistency_set=ids
         )
-        site.add_constraint(replace(accepted, checks={**accepted.checks, **figures}))
+        site.add_constraint(accepted.with_figures(figures))
     site.merged_into[absorbed] = survivor
     return ComponentMerged(survivor, absorbed, ids)
 
 
-def _figures(
-    site: SiteMap, chosen: list[Constraint], rival: list[Constraint], overlap: Overlap
-) -> dict[str, float]:
-    """What the set was held to, for every one of its constraints to show."""
+def _figures(site: SiteMap, chosen: list[Constraint], rival: list[Constraint]) -> dict[str, float]:
+    """What is had of a set at once; every one of its constraints will show it."""
+    places = {c.place_a for c in chosen}, {c.place_b for c in chosen}
+    ends = (chosen[0].keyframe_a, chosen[0].keyframe_b) if chosen else ()
     return {
         "set_size": float(len(chosen)),
-        "set_evidence": sum(c.evidence for c in chosen),
+        "set_places": float(min(map(len, places))),
+        "known_places": float(min(map(site.places_in_component, ends), default=0)),
+        "set_evidence": float(sum(c.evidence for c in chosen)),
         "rival_evidence": float(sum(c.evidence for c in rival)),
-        "set_distinctive": float(_distinctive(site, chosen)),
-        "set_missing": overlap.set_missing,
-        "set_doubt": overlap.set_doubt,
-        "map_missing": overlap.map_missing,
     }
 
 
@@ -119,26 +118,6 @@ def _best_sets(
     sets = [[candidates[i] for i in members] for members in consistent_sets(agree, least=1)]
     sets.sort(key=lambda s: -sum(c.evidence for c in s))
     return sets[0], sets[1] if len(sets) > 1 else []
-
-
-def _objection_to_set(site: SiteMap, chosen: list[Constraint], rival: list[Constraint]) -> str:
-    """Why a set does not convince; empty where it does."""
-    config = site.config.join
-    if len(chosen) < config.least_set:
-        return "too few constraints agree"
-    if len({c.place_a for c in chosen}) < 2 or len({c.place_b for c in chosen}) < 2:
-        return "all constraints rest on one place"
-    for keyframe in (chosen[0].keyframe_a, chosen[0].keyframe_b):
-        if site.places_in_component(keyframe) < config.least_places:
-            return "too little is known of one component"
-    evidence = sum(c.evidence for c in chosen)
-    if evidence < config.least_evidence:
-        return "too little evidence in all"
-    if evidence < config.lead * sum(c.evidence for c in rival):
-        return "another set of constraints says something else"
-    if _distinctive(site, chosen) < config.least_distinctive:
-        return "the places look like others of the same robots"
-    return ""
 
 
 def _distinctive(site: SiteMap, chosen: list[Constraint]) -> int:

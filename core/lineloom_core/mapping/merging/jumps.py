@@ -18,6 +18,7 @@ from lineloom_core.mapping.belief.constraint import Constraint, step_id
 from lineloom_core.mapping.belief.place_making import make_place
 from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.belief.track import Track
+from lineloom_core.mapping.merging.withdrawal import is_doubted, withdrawn
 from lineloom_core.places import Place, count_steady_each_way, missing_share
 
 _MEMBERS = 8  # keyframes on either side of a step that are held against each other
@@ -34,10 +35,9 @@ def jump(site: SiteMap, place: Place) -> Constraint | None:
         if min(map(sum, ways)) < config.jump_points:
             continue
         share = math.sqrt(math.prod(missing_share(*way) for way in ways))
-        if share >= config.jump_missing:
-            reason = f"withdrawn: the robot jumped here, {share:.1%} of what stood still is gone"
+        if is_doubted(site, {"jump_missing": share}):
             step = site.constraints[step_id(track.keyframes[at])]
-            return step.moved_to("retracted", reason, site.now)
+            return withdrawn(site, step, {"jump_missing": share})
     return None
 
 

@@ -7,6 +7,7 @@ cannot glue similar places together: a window of a few decimetres holds no secon
 
 from __future__ import annotations
 
+from lineloom_core.checks import NEAR_LOOP
 from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.mapping.belief.constraint import Constraint, near_loop_id
 from lineloom_core.mapping.belief.site_map import SiteMap
@@ -65,12 +66,7 @@ def _register(site: SiteMap, older: int, newer: int) -> Constraint | None:
         "moved_m": found.pose.distance(predicted),
         "turned_rad": abs(angle_difference(found.pose.theta, predicted.theta)),
     }
-    if (
-        found.fit < config.least_fit
-        or checks["conflict_share"] > config.most_conflict
-        or checks["moved_m"] > 1.5 * config.reach_xy
-        or checks["turned_rad"] > 1.5 * config.reach_theta
-    ):
+    if NEAR_LOOP.against(config, checks):
         return None
     return Constraint(
         id=near_loop_id(older, newer),

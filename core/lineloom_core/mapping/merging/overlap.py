@@ -11,16 +11,12 @@ map, a few metres on, where it knows its way well: so much more may it miss in a
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 from lineloom_core.geometry import Pose
 from lineloom_core.mapping.belief.constraint import CONSTRAINT_FLOOR, Constraint
 from lineloom_core.mapping.belief.site_map import SiteMap
-from lineloom_core.mapping.config import JoinConfig
-from lineloom_core.places import Place, count_steady, missing_share
+from lineloom_core.places import PLACE_GATE, Place, count_steady, missing_share
 
-_GATE = 0.3  # m: how far registration may move a pair of places that drift has moved
-_SIGMA = 0.04
 _APART = 2  # places on: the next but one shares no keyframe
 _AT_MOST = 10.0  # m driven: farther on, places in between have been let go
 
@@ -28,34 +24,15 @@ Count = tuple[int, int]
 """Steady points that both saw, and those that one should have seen and did not."""
 
 
-@dataclass(frozen=True, slots=True)
-class Overlap:
-    """Shares of what stood still for one and is missing for the other.
+def overlap_of_sets(
+    site: SiteMap, chosen: list[Constraint], poses: Mapping[int, Pose]
+) -> dict[str, float]:
+    """Shares of what stood still for one and is missing for the other, at the set and elsewhere.
 
+    poses: of all keyframes of both, in one frame, as they would be if the set were believed.
     set_missing: over the places of the constraints; map_missing: over all that would overlap; both
     beyond what the robots miss in their own maps. set_doubt: set_missing as it would be if a few
     more pieces of furniture were missing, which a small overlap cannot rule out.
-    """
-
-    set_missing: float
-    map_missing: float
-    set_doubt: float
-
-    def objection(self, config: JoinConfig) -> str:
-        """Why the two maps are not to be joined; empty where they may be."""
-        if self.set_missing > config.most_missing:
-            return f"what stood still for one is missing for the other ({self.set_missing:.1%})"
-        if self.set_doubt > config.most_doubt:
-            return "too little was seen by both to tell it from a place that looks alike"
-        if self.map_missing > config.most_map_missing:
-            return f"the maps contradict each other there ({self.map_missing:.1%})"
-        return ""
-
-
-def overlap_of_sets(site: SiteMap, chosen: list[Constraint], poses: Mapping[int, Pose]) -> Overlap:
-    """Hold both maps against each other, at the constraints and wherever they would overlap.
-
-    poses: of all keyframes of both, in one frame, as they would be if the set were believed.
     """
     near_a = places_near(site, [c.keyframe_a for c in chosen])
     near_b = places_near(site, [c.keyframe_b for c in chosen])
@@ -71,11 +48,11 @@ def overlap_of_sets(site: SiteMap, chosen: list[Constraint], poses: Mapping[int,
         if poses[a.anchor].distance(poses[b.anchor]) <= site.config.places.span
     )
     doubted = missing + site.config.join.doubted_points
-    return Overlap(
-        set_missing=max(missing_share(matched, missing) - usual, 0.0),
-        map_missing=max(missing_share(*elsewhere) - usual, 0.0),
-        set_doubt=max(missing_share(matched, doubted) - usual, 0.0),
-    )
+    return {
+        "set_missing": max(missing_share(matched, missing) - usual, 0.0),
+        "set_doubt": max(missing_share(matched, doubted) - usual, 0.0),
+        "map_missing": max(missing_share(*elsewhere) - usual, 0.0),
+    }
 
 
 def T_places(site: SiteMap, c: Constraint) -> Pose:
@@ -88,8 +65,8 @@ def T_places(site: SiteMap, c: Constraint) -> Pose:
 
 def count_steady_nearby(a: Place, b: Place, T_a_b: Pose) -> Count:
     """`count_steady` at a predicted pose, which registration may first correct a little."""
-    found = a.local_map.register(b.surface, T_a_b, gate=_GATE, sigma=_SIGMA).pose
-    return count_steady(a, b, found if found.distance(T_a_b) < _GATE else T_a_b)
+    found = a.register(b, T_a_b).pose
+    return count_steady(a, b, found if found.distance(T_a_b) < PLACE_GATE else T_a_b)
 
 
 def places_near(site: SiteMap, keyframes: list[int]) -> list[Place]:

@@ -6,8 +6,11 @@ or when it moves things by little. What the solved graph then does not bear out 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from lineloom_core.checks import DOUBTED, WIDE_LOOP
 from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.mapping.belief.constraint import CONSTRAINT_FLOOR, Constraint
 from lineloom_core.mapping.belief.refusals import refuse_barred
@@ -28,27 +31,29 @@ def close_wide_loops(site: SiteMap, place: Place) -> bool:
     ]
     candidates = refuse_barred(site, candidates)
     # All are judged by the graph as it was: accepting one changes what the drift allows the next.
-    judged = [(c, _confirmed(site, c, candidates)) for c in candidates]
-    believed = [(c, agreeing) for c, agreeing in judged if agreeing is not None]
-    for c, agreeing in believed:
-        ids = tuple(sorted([c.id, *(o.id for o in agreeing)]))
-        site.add_constraint(
-            c.moved_to("accepted", "within the drift and confirmed", site.now, consistency_set=ids)
-        )
+    believed = [c for c in [_judged(site, c, candidates) for c in candidates] if c.consistency_set]
+    for c in believed:
+        site.add_constraint(c)
     if believed:
         site.optimise(root)
-        _drop_contradicted(site, [c.id for c in candidates], root)
+        _drop_contradicted(site, candidates, root)
     return bool(believed)
 
 
-def _confirmed(
-    site: SiteMap, c: Constraint, candidates: list[Constraint]
-) -> list[Constraint] | None:
-    """The others that agree with a candidate; None where it is not to be believed."""
-    if not _within_drift(site, c):
-        return None
-    agreeing = [o for o in candidates if o.id != c.id and _loops_agree(site, c, o)]
-    return agreeing if agreeing or _small_step(site, c) else None
+def _judged(site: SiteMap, c: Constraint, candidates: list[Constraint]) -> Constraint:
+    """The candidate with its figures, accepted where nothing speaks against it."""
+    config, off = site.config.wide_loops, _correction(site, c)
+    figures = {"drift_sigmas": _sigmas(site, c, off), **_corrected(off)}
+    agreeing: list[str] = []
+    if not WIDE_LOOP.against(config, figures):
+        agreeing = [o.id for o in candidates if o.id != c.id and _loops_agree(site, c, o)]
+        figures["agreeing"] = float(len(agreeing))
+    c = c.with_figures(figures)
+    objection = WIDE_LOOP.objection(config, figures)
+    if objection:
+        return c.moved_to("candidate", objection, site.now)
+    ids = tuple(sorted([c.id, *agreeing]))
+    return c.moved_to("accepted", "within the drift and confirmed", site.now, consistency_set=ids)
 
 
 def _correction(site: SiteMap, c: Constraint) -> Pose:
@@ -56,44 +61,44 @@ def _correction(site: SiteMap, c: Constraint) -> Pose:
     return c.T_a_b.between(site.pose(c.keyframe_a).between(site.pose(c.keyframe_b)))
 
 
-def _within_drift(site: SiteMap, c: Constraint) -> bool:
-    off = _correction(site, c).to_array()
+def _corrected(off: Pose) -> dict[str, float]:
+    return {"corrected_m": math.hypot(off.x, off.y), "corrected_rad": abs(off.theta)}
+
+
+def _sigmas(site: SiteMap, c: Constraint, off: Pose) -> float:
+    """The correction against the drift in between."""
+    error = off.to_array()
     covariance = site.drift(c.keyframe_a, c.keyframe_b) + CONSTRAINT_FLOOR
-    return float(off @ np.linalg.solve(covariance, off)) < site.config.join.loop_gate**2
-
-
-def _small_step(site: SiteMap, c: Constraint) -> bool:
-    off = _correction(site, c)
-    return bool(np.hypot(off.x, off.y) < 0.5 and abs(off.theta) < 0.08)
+    return math.sqrt(float(error @ np.linalg.solve(covariance, error)))
 
 
 def _loops_agree(site: SiteMap, c: Constraint, o: Constraint) -> bool:
     """Two loops agree when they correct the graph alike, give or take the drift in between."""
     if {c.place_a, c.place_b} & {o.place_a, o.place_b} == {c.place_a, c.place_b}:
         return False
+    config = site.config.wide_loops
     T_c, T_o = (
         site.pose(k.keyframe_a) @ k.T_a_b @ site.pose(k.keyframe_b).inverse() for k in (c, o)
     )
     at = site.pose(c.keyframe_b)
     off = (T_c @ at).between(T_o @ at)
     slack = (
-        0.3
+        config.slack
         + reach(site.drift(c.keyframe_a, o.keyframe_a))
         + reach(site.drift(c.keyframe_b, o.keyframe_b))
     )
-    return bool(np.hypot(off.x, off.y) < slack and abs(angle_difference(off.theta, 0.0)) < 0.1)
+    return math.hypot(off.x, off.y) < slack and abs(angle_difference(off.theta, 0.0)) < config.turn
 
 
-def _drop_contradicted(site: SiteMap, ids: list[str], root: int) -> None:
-    """Withdraw accepted constraints that the optimised graph does not bear out."""
+def _drop_contradicted(site: SiteMap, candidates: list[Constraint], root: int) -> None:
+    """Reject again what the optimised graph does not bear out."""
     dropped = False
-    for constraint_id in ids:
-        c = site.constraints[constraint_id]
-        if c.state != "accepted":
-            continue
+    for c in (site.constraints[candidate.id] for candidate in candidates):
         off = _correction(site, c)
-        if np.hypot(off.x, off.y) > 0.4 or abs(off.theta) > 0.1:
-            site.add_constraint(c.moved_to("rejected", "the graph contradicts it", site.now))
+        strain = {"strain_m": math.hypot(off.x, off.y), "strain_rad": abs(off.theta)}
+        objection = DOUBTED.objection(site.config.doubt, strain)
+        if c.state == "accepted" and objection:
+            site.add_constraint(c.with_figures(strain).moved_to("rejected", objection, site.now))
             dropped = True
     if dropped:
         site.optimise(root)

@@ -31,7 +31,8 @@
  *
  * @typedef {"sequential"|"loop"|"rendezvous"} ConstraintKind
  * @typedef {"candidate"|"accepted"|"rejected"|"retracted"} ConstraintState
- * @typedef {{at_least: number|null, at_most: number|null, holds: boolean}} Limit
+ * @typedef {{at_least: number|null, at_most: number|null, holds: boolean, means?: string,
+ *   unit?: string}} Limit
  * @typedef {{reference: number[], current: number[], overlap: number, distance: number,
  *   angle: number}} MatchedPair
  * @typedef {{id: string, kind: ConstraintKind, state: ConstraintState, keyframe_a: number,
@@ -51,7 +52,7 @@
  *   component_after: string|null}[]}} WhatIfAnswer
  *
  * @typedef {Pose & {component: string, covariance: (number|null)[][]|null, score: number,
- *   checks: Object<string, number|null>}} HypothesisAnswer
+ *   checks: Object<string, number|null>, limits?: Object<string, Limit>}} HypothesisAnswer
  * @typedef {{verdict: "unique"|"ambiguous"|"unknown", hypotheses: HypothesisAnswer[],
  *   reason: string, scan: number|null}} LocalizeAnswer
  *

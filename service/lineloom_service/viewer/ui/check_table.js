@@ -1,29 +1,8 @@
 import { h } from "./dom.js";
 import { degrees, figure, metres, percent } from "./format.js";
 
-/** @type {Record<string, [string, (value: number) => string]>} check -> its name and how to write it */
-export const CHECKS = {
-  matched: ["Points in common", figure],
-  conflict: ["Points in free space", figure],
-  conflict_share: ["Share in free space", percent],
-  own_conflict: ["Clutter of the places", percent],
-  missing_share: ["Missing of what stood still", percent],
-  fit: ["Fit", figure],
-  information: ["Information", figure],
-  isotropy: ["Isotropy", figure],
-  overlap: ["Common wall", metres],
-  evidence: ["Evidence", metres],
-  margin: ["Margin to runner-up", percent],
-  set_size: ["Constraints that agree", figure],
-  set_evidence: ["Their evidence", metres],
-  set_missing: ["Missing over all of them", percent],
-  set_doubt: ["The same, if three things more were", percent],
-  map_missing: ["Missing wherever the maps overlap", percent],
-  set_distinctive: ["Of them, from places unlike others", figure],
-  rival_evidence: ["Evidence of a rival set", metres],
-  moved_m: ["Moved by the closure", metres],
-  turned_rad: ["Turned by the closure", degrees],
-};
+/** @type {Record<string, (value: number) => string>} unit -> how people read it; others as they are */
+const WRITTEN = { m: metres, rad: degrees, share: percent };
 
 /**
  * The figures against their thresholds.
@@ -33,7 +12,7 @@ export const CHECKS = {
  */
 export function checkTable(checks, limits) {
   const names = [...new Set([...Object.keys(limits), ...Object.keys(checks)])];
-  const judged = Object.keys(limits).length > 0;
+  const judged = Object.values(limits).some(decides);
   const head = h(
     "tr",
     {},
@@ -48,8 +27,9 @@ export function checkTable(checks, limits) {
 
 /** @param {string} name @param {number|null|undefined} value @param {import("../net/contract.js").Limit|undefined} limit @param {boolean} judged */
 function row(name, value, limit, judged) {
-  const [words, write] = CHECKS[name] ?? [name.replaceAll("_", " "), figure];
-  const held = limit === undefined ? "" : limit.holds ? "held" : "failed";
+  const words = limit?.means || name.replaceAll("_", " ");
+  const write = writer(limit?.unit ?? "");
+  const held = !limit || !decides(limit) ? "" : limit.holds ? "held" : "failed";
   const sign = { held: "✓", failed: "✗", "": "" }[held];
   return h(
     "tr",
@@ -65,6 +45,16 @@ function row(name, value, limit, judged) {
         held && hidden(held === "held" ? "holds" : "does not hold"),
       ),
   );
+}
+
+/** Whether the figure is held to anything, or only shown. @param {import("../net/contract.js").Limit} limit */
+function decides({ at_least, at_most }) {
+  return at_least !== null || at_most !== null;
+}
+
+/** @param {string} unit @returns {(value: number) => string} */
+function writer(unit) {
+  return WRITTEN[unit] ?? ((value) => `${figure(value)} ${unit}`.trim());
 }
 
 /** Return words for screen readers alone. @param {string} words */

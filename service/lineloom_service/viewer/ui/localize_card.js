@@ -48,7 +48,7 @@ export function localizeCard(localizer, { onClose }, onChoose) {
         ["Position", `${chosen.x.toFixed(2)}, ${chosen.y.toFixed(2)} m`],
         ["Heading", degrees(chosen.theta)],
       ]),
-    chosen && Object.keys(chosen.checks ?? {}).length > 0 && checkTable(chosen.checks, {}),
+    chosen && Object.keys(chosen.checks ?? {}).length > 0 && checkTable(chosen.checks, chosen.limits ?? {}),
     h("p", { className: "muted" }, "Nothing was added to the map."),
   );
 }

@@ -1,0 +1,83 @@
+"""What a figure is held to: rows of the table that mapper, answers, documents and viewer read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+Figures = Mapping[str, float]
+"""What was measured, by the name of its check."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """What a figure was held to; both bounds None where it is only shown.
+
+    means, unit: of the figure, for whoever shows it. unit: "" for a plain number, "share" for 0..1.
+    """
+
+    at_least: float | None
+    at_most: float | None
+    holds: bool
+    means: str = ""
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """A figure, what it means, and the parameter that it must come up to or must not go beyond.
+
+    objection: why not, where it speaks against; `{0}` stands for the figure. adjusted: from the
+    parameters, the threshold among them, and the other figures to what counts; told: that in words.
+    """
+
+    name: str
+    means: str
+    unit: str = ""
+    at_least: str = ""
+    at_most: str = ""
+    objection: str = ""
+    adjusted: Callable[[Any, float, Figures], float] | None = None
+    told: str = ""
+
+    def limit(self, config: object, figures: Figures) -> Limit:
+        """What the figure is held to under these parameters; it must be there."""
+        parameter = self.at_least or self.at_most
+        if not parameter:
+            return Limit(None, None, True, self.means, self.unit)
+        threshold = float(getattr(config, parameter))
+        if self.adjusted is not None:
+            threshold = self.adjusted(config, threshold, figures)
+        value = figures[self.name]
+        if self.at_least:
+            return Limit(threshold, None, value >= threshold, self.means, self.unit)
+        return Limit(None, threshold, value <= threshold, self.means, self.unit)
+
+
+@dataclass(frozen=True, slots=True)
+class Checks:
+    """What one way of judging looks at, in its order; section: of `MapperConfig`, the parameters.
+
+    A figure that was not measured is not judged: what is dear is asked for last.
+    """
+
+    title: str
+    section: str
+    rows: tuple[Check, ...]
+
+    def against(self, config: object, figures: Figures) -> Check | None:
+        """The first check that speaks against it, None where none does."""
+        for row in self.rows:
+            if row.name in figures and not row.limit(config, figures).holds:
+                return row
+        return None
+
+    def objection(self, config: object, figures: Figures) -> str:
+        """The same in words; empty where nothing speaks against it."""
+        row = self.against(config, figures)
+        return "" if row is None else row.objection.format(figures[row.name])
+
+    def limits(self, config: object, figures: Figures) -> dict[str, Limit]:
+        """What every figure that is there was held to, by its name."""
+        return {r.name: r.limit(config, figures) for r in self.rows if r.name in figures}
