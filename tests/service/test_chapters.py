@@ -6,9 +6,10 @@ import asyncio
 import logging
 import os
 import signal
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 import sqlalchemy as sa
@@ -50,15 +51,18 @@ async def _chapters(store: SqlStore) -> tuple[bytes, ...]:
     return tuple([chapter async for chapter in read_chapters(store, SITE, snapshot)])
 
 
-def _watched(monkeypatch: pytest.MonkeyPatch) -> list[SnapshotRecord]:
-    """What is saved from now on."""
+def _watched(system: System, monkeypatch: pytest.MonkeyPatch) -> list[SnapshotRecord]:
+    """What the system knows to be saved from now on."""
     saved: list[SnapshotRecord] = []
+    write = system.store.write_as_engine
 
-    def watch(tx: Transaction, site_id: int, snapshot: SnapshotRecord) -> None:
-        save_snapshot(tx, site_id, snapshot)
-        saved.append(snapshot)
+    async def watch(action: Callable[..., Any], *arguments: Any) -> Any:
+        done = await write(action, *arguments)
+        if action is save_snapshot:
+            saved.append(arguments[1])
+        return done
 
-    monkeypatch.setattr(site_runner, "save_snapshot", watch)
+    monkeypatch.setattr(system.store, "write_as_engine", watch)
     return saved
 
 
@@ -68,7 +72,7 @@ async def test_every_chapter_is_saved_once(
     saved: list[SnapshotRecord] = []
     for start, end in ((0, 120), (120, SCANS)):  # the second time it goes on from what is there
         async with running(tmp_path, database_url) as system:
-            now = _watched(monkeypatch)
+            now = _watched(system, monkeypatch)
             await system.post(range(start, end))
             await system.caught_up()
         saved += now

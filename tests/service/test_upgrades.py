@@ -18,6 +18,7 @@ import pytest
 import sqlalchemy as sa
 from lineloom_service.store import sqlite_upgrade
 from lineloom_service.store.migrate import current_revision, migrate
+from lineloom_service.store.migrations import versions
 from lineloom_service.store.postgres_database import PostgresDatabase
 from lineloom_service.store.records import StoreError
 from lineloom_service.store.sql_store import SqlStore
@@ -201,6 +202,11 @@ async def test_what_an_earlier_version_left_half_upgraded_is_completed(
         assert _copies(path) == copies
     # As it was, and at least once with something of the next revision.
     assert states > 1
+
+
+def test_there_is_an_old_database_of_every_revision() -> None:
+    steps = Path(versions.__file__).parent.glob("r*.py")
+    assert sorted(step.name[1:5] for step in steps) == list(REVISIONS)
 
 
 async def test_the_copy_of_a_start_that_failed_serves_the_next(tmp_path: Path) -> None:
