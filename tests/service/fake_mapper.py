@@ -37,10 +37,11 @@ from lineloom_core.mapping.answers.site_view import (
     MapLine,
     RobotView,
     SiteView,
-    TrajectoryView,
 )
+from lineloom_core.mapping.answers.trajectories import Trajectories, Way, Whereabouts
 from lineloom_core.mapping.belief.constraint_state import StateChange
 from lineloom_core.mapping.changes import Changes
+from lineloom_core.mapping.facts.placed_scans import ScanBlock
 from lineloom_core.mapping.facts.unplaced_scan import UnplacedScan
 from lineloom_core.mapping.snapshot import Snapshot
 from lineloom_core.scan import Mount, Scan
@@ -172,7 +173,7 @@ class FakeMapper:
                 for c in components
             ),
             merged_into={"c9": "c1"},
-            trajectories={robot: self._trajectory(robot) for robot in robots},
+            trajectories=self._trajectories(robots),
             lines=tuple(self._lines(components)),
             keyframes=keyframes,
             constraints=tuple(self._constraints(keyframes)),
@@ -226,15 +227,17 @@ class FakeMapper:
             latest_seq=seq,
         )
 
-    def _trajectory(self, robot: str) -> TrajectoryView:
-        scans = self._scans[robot]
-        return TrajectoryView(
-            session=tuple(s for s, _, _ in scans),
-            seq=np.array([n for _, n, _ in scans], dtype=np.int64),
-            stamp=np.array([t for _, _, t in scans]),
-            component=tuple(_component(robot) for _ in scans),
-            poses=np.array([[i + 1.0, 0.0, 0.0] for i in range(len(scans))]),
-            unplaced=(UnplacedScan("0", 77, 99.5, 1),) if robot == "alone" else (),
+    def _trajectories(self, robots: tuple[str, ...]) -> Trajectories:
+        """Every robot's scans hang at a keyframe of its own at the origin."""
+        lost = (UnplacedScan("0", 77, 99.5, 1),)
+        return Trajectories(
+            {r: Way(1, lost if r == "alone" else (), Pose.identity()) for r in robots},
+            tuple(_block(keyframe, self._scans[robot]) for keyframe, robot in enumerate(robots)),
+            Whereabouts(
+                np.zeros((len(robots), 3)),
+                np.arange(len(robots), dtype=np.int32),
+                tuple(map(_component, robots)),
+            ),
         )
 
     def _lines(self, components: list[str]) -> list[MapLine]:
@@ -288,6 +291,18 @@ def _unsealed(chapter: bytes) -> list[tuple[str, str, int, float]]:
     return [
         (str(r), str(s), int(n), float(t)) for r, s, n, t in json.loads(zlib.decompress(chapter))
     ]
+
+
+def _block(keyframe: int, scans: list[tuple[str, int, float]]) -> ScanBlock:
+    sessions = tuple(dict.fromkeys(s for s, _, _ in scans))
+    return ScanBlock(
+        sessions,
+        np.array([sessions.index(s) for s, _, _ in scans], dtype=np.int32),
+        np.array([n for _, n, _ in scans], dtype=np.int64),
+        np.array([t for _, _, t in scans]),
+        np.full(len(scans), keyframe),
+        np.array([[i + 1.0, 0.0, 0.0] for i in range(len(scans))]),
+    )
 
 
 def _component(robot: str) -> str:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import pickle
+import sys
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -194,6 +196,35 @@ async def test_a_process_that_never_maps_leaves_it_to_the_others(url: str, tmp_p
         assert (await a.get("/v1/sites/s"))["scans"]["processed"] == 0
         async with process(url, tmp_path):
             assert await a.map() == await _undisturbed(tmp_path, 10)
+
+
+class _Trap:
+    """Runs code when it is unpickled."""
+
+    def __reduce__(self) -> tuple[Callable[..., object], tuple[str]]:
+        return exec, ("import sys; sys.trapped = True",)
+
+
+@pytest.mark.parametrize("rubbish", [b"", b"rubbish", pickle.dumps(_Trap())])
+async def test_a_view_that_somebody_put_into_the_database_is_told_and_ignored(
+    url: str, tmp_path: Path, caplog: pytest.LogCaptureFixture, rubbish: bytes
+) -> None:
+    async with process(url, tmp_path) as a, process(url, tmp_path, engine="off") as b:
+        await a.post(range(10))
+        before = await b.map()
+        admin = create_async_engine(url, isolation_level="AUTOCOMMIT")
+        async with admin.connect() as connection:
+            forged = text("UPDATE views SET position = position + 1, data = :data")
+            await connection.execute(forged, {"data": rubbish})
+            await connection.execute(text("SELECT pg_notify('lineloom', 'view 1')"))
+        await admin.dispose()
+        async with asyncio.timeout(30.0):
+            while "unreadable view" not in caplog.text:
+                await asyncio.sleep(0.02)
+        assert await b.get("/v1/sites/s/map") == before
+        assert not hasattr(sys, "trapped")
+        await a.post(range(10, 20))
+        assert await b.map() == await a.map() == await _undisturbed(tmp_path, 20)
 
 
 async def test_a_site_deleted_through_one_is_gone_for_all(url: str, tmp_path: Path) -> None:

@@ -254,8 +254,10 @@ def test_a_line_set_that_was_brought_up_to_date_is_one_made_anew(run: Run) -> No
             Array.from({ length: end - start }, (_, i) => row(set, start + i)).sort().join("; "),
         ].join(" ")).sort();
         const bounds = (set) => JSON.stringify([...set.bounds].sort());
+        const { TableChange } = await import('/viewer/data/table_change.js');
         const differences = [];
-        let lines = new Map(Array.from({ length: 300 }, (_, i) => [`l${i}`, made(`l${i}`)]));
+        const lines = new Map(Array.from({ length: 300 }, (_, i) => [`l${i}`, made(`l${i}`)]));
+        const table = new Map(lines);
         let robots = ["ada", "bob"];
         let set = m.LineSet.of([...lines.values()], robots);
         for (let round = 0; round < 40; round++) {
@@ -266,9 +268,9 @@ def test_a_line_set_that_was_brought_up_to_date_is_one_made_anew(run: Run) -> No
             const numbers = Array.from({ length: whole(0, 20) }, (_, i) => 1000 * (round + 1) + i);
             const fresh = numbers.map((i) => `l${i}`);
             const changed = [...moved, ...fresh].map(made);
-            const out = new Map(names.map((name) => [name, lines.get(name)]));
             const before = set;
-            set = set.updated(changed, out, robots);
+            const change = new TableChange(changed, removed);
+            set = set.updated(change, change.apply(table), robots);
             for (const name of removed) lines.delete(name);
             for (const line of changed) lines.set(line.id, line);
             const anew = m.LineSet.of([...lines.values()], robots);
@@ -278,6 +280,8 @@ def test_a_line_set_that_was_brought_up_to_date_is_one_made_anew(run: Run) -> No
                 looks: looks(set).join("|") !== looks(anew).join("|"),
                 bounds: bounds(set) !== bounds(anew),
                 arrived: arrived.sort().join() !== fresh.sort().join(),
+                table: [...table.values()].some((line) => lines.get(line.id) !== line),
+                size: table.size !== lines.size,
                 index: set.indexOf(changed[0]?.id) !== set.answers.indexOf(changed[0]),
                 removed: removed.some((name) => set.indexOf(name) !== -1),
             };

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_core.mapping.snapshot import Snapshot
 
-from lineloom_service.engine.view_parts import ViewParts
+from lineloom_service.engine.view_parts import Parts
 from lineloom_service.observation.durations import Durations
 from lineloom_service.store.records import LogEntry
 
@@ -123,7 +123,7 @@ class EncodedView:
     site: int
     run: int
     position: int
-    parts: ViewParts
+    parts: Parts
 
 
 @dataclass(frozen=True, slots=True)

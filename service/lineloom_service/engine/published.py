@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from lineloom_core.mapping.answers.site_view import SiteView
+from lineloom_core.mapping.answers.trajectories import NO_TRAJECTORIES
 
 from lineloom_service.store.records import Skip
 
@@ -29,7 +30,7 @@ EMPTY_VIEW = SiteView(
     robots={},
     components=(),
     merged_into={},
-    trajectories={},
+    trajectories=NO_TRAJECTORIES,
     lines=(),
     keyframes=(),
     constraints=(),

@@ -7,7 +7,7 @@ import logging
 import time
 
 from lineloom_service.engine.published import Published
-from lineloom_service.engine.view_record import ViewReader, write_view
+from lineloom_service.engine.view_record import ViewReader, ViewWriter
 from lineloom_service.store.actions import save_view
 from lineloom_service.store.protocol import Store
 from lineloom_service.store.reads import read_view
@@ -28,6 +28,7 @@ class SharedViews:
         self._store = store
         self._views: dict[int, Published] = {}
         self._readers: dict[int, ViewReader] = {}
+        self._writers: dict[int, ViewWriter] = {}
         self._to_save: dict[int, Published] = {}
         self._wanted: set[int] = set()
         self._tasks: dict[tuple[str, int], asyncio.Task[None]] = {}
@@ -58,6 +59,7 @@ class SharedViews:
                 task.cancel()
         self._views.pop(site_id, None)
         self._readers.pop(site_id, None)
+        self._writers.pop(site_id, None)
         self._to_save.pop(site_id, None)
         self._wanted.discard(site_id)
 
@@ -69,7 +71,8 @@ class SharedViews:
         await asyncio.gather(*tasks, return_exceptions=True)
         for site_id, published in list(self._to_save.items()):
             try:
-                record = await asyncio.to_thread(write_view, published)
+                # Whole: a thread that was given up may still be at it with the site's own writer.
+                record = await asyncio.to_thread(ViewWriter().write, published)
                 await self._store.write_apart_as_engine(save_view, site_id, record)
             except StoreError:
                 _LOG.warning("the last view of site %d is not shared", site_id)
@@ -85,7 +88,8 @@ class SharedViews:
         while (published := self._to_save.pop(site_id, None)) is not None:
             begin = time.monotonic()
             try:
-                record = await asyncio.to_thread(write_view, published)
+                writer = self._writers.setdefault(site_id, ViewWriter())
+                record = await asyncio.to_thread(writer.write, published)
                 await self._store.write_apart_as_engine(save_view, site_id, record)
             except StoreError as error:
                 _LOG.warning("site %d: a view is not shared: %s", site_id, error)
@@ -110,5 +114,5 @@ class SharedViews:
             except StoreError:
                 self._wanted.add(site_id)
                 await asyncio.sleep(_AGAIN_S)
-            except ValueError as error:  # of another version of the service
-                _LOG.warning("site %d: %s", site_id, error)
+            except ValueError as error:  # damaged, or of another version of the service
+                _LOG.warning("site %d: %s; the view before stands", site_id, error)

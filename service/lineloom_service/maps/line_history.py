@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from lineloom_core.mapping.answers.site_view import MapLine, SiteView
+from lineloom_core.mapping.answers.table_change import TableChange
 
 _VERSIONS = 1_000
 """Versions back to which a difference can be told."""
@@ -52,23 +53,25 @@ class LineHistory:
                 self._table = self._advanced(view)
             if view.version == self._table.version:
                 return self._table
-        lines = {line.id: Written(line, self._write(line), view.version) for line in view.lines}
-        return LineTable(view.version, lines, {}, frozenset())
+        return LineTable(view.version, self._change({}, view).apply({}), {}, frozenset())
 
     def _advanced(self, view: SiteView) -> LineTable:
-        before = self._table.lines
-        lines: dict[str, Written] = {}
-        for line in view.lines:
-            written = before.get(line.id)
-            if written is None or (written.line is not line and written.line != line):
-                written = Written(line, self._write(line), view.version)
-            lines[line.id] = written
         self._versions.append(view.version)
-        oldest = self._versions[0]
-        removed = {
-            name: version
-            for name, version in self._table.removed.items()
-            if version > oldest and name not in lines
-        }
-        removed.update((name, view.version) for name in before if name not in lines)
-        return LineTable(view.version, lines, removed, frozenset(self._versions))
+        change = self._change(self._table.lines, view)
+        lines = change.apply(self._table.lines)
+        removed = self._table.removed | dict.fromkeys(change.gone, view.version)
+        return LineTable(
+            view.version,
+            lines,
+            {
+                id: version
+                for id, version in removed.items()
+                if version > self._versions[0] and id not in lines
+            },
+            frozenset(self._versions),
+        )
+
+    def _change(self, before: dict[str, Written], view: SiteView) -> TableChange[str, Written]:
+        known = {id: written.line for id, written in before.items()}
+        change = TableChange.between(known, {line.id: line for line in view.lines})
+        return change.mapped(lambda line: Written(line, self._write(line), view.version))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from lineloom_core.codec import storable
+
 EntryKind = Literal["scan", "mount", "forget", "retract", "restore"]
 ActionKind = Literal["retract", "restore"]
 """What an operator can do to a constraint; the entry's body is its id."""
@@ -100,6 +102,7 @@ class ViewRecord:
     data: bytes
 
 
+@storable("skip")
 @dataclass(frozen=True, slots=True)
 class Skip:
     """An entry that is never fed to the mapper again, and why."""

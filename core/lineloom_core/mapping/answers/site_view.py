@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.geometry import Pose
 from lineloom_core.mapping.belief.constraint_state import (
     ConstraintKind,
@@ -18,6 +19,7 @@ from lineloom_core.mapping.facts.robot_state import RobotState
 from lineloom_core.mapping.facts.unplaced_scan import UnplacedScan
 
 
+@storable("robot-view")
 @dataclass(frozen=True)
 class RobotView:
     """A robot at its latest processed scan.
@@ -39,6 +41,7 @@ class RobotView:
     health: tuple[str, ...] = ()
 
 
+@storable("component-view")
 @dataclass(frozen=True)
 class ComponentView:
     """A set of trajectory pieces whose relative poses are known."""
@@ -75,6 +78,7 @@ class TrajectoryView:
                 yield self.session[i], seq[i], stamp[i], self.component[i], poses[i]
 
 
+@storable("map-line")
 @dataclass(frozen=True)
 class MapLine:
     """A wall piece seen by one or more scans; the free side lies left of 1 -> 2.
@@ -96,6 +100,7 @@ class MapLine:
     last_seen: float
 
 
+@storable("keyframe-view")
 @dataclass(frozen=True)
 class KeyframeView:
     """A node of the pose graph: pose of the laser in the component's map frame."""
@@ -109,6 +114,7 @@ class KeyframeView:
     pose: Pose
 
 
+@storable("place-view")
 @dataclass(frozen=True, slots=True)
 class PlaceView:
     """The last metres of a robot's way at one time, by which it is recognised (`Place`).
@@ -122,6 +128,7 @@ class PlaceView:
     keyframes: tuple[int, ...]
 
 
+@storable("constraint-view")
 @dataclass(frozen=True)
 class ConstraintView:
     """An edge of the pose graph and why it is what it is.

@@ -13,12 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.geometry import Pose, se2
 from lineloom_core.mapping.answers.site_view import TrajectoryView
 from lineloom_core.mapping.facts.placed_scans import ScanBlock
 from lineloom_core.mapping.facts.unplaced_scan import UnplacedScan
 
 
+@storable("whereabouts")
 @dataclass(frozen=True, eq=False, slots=True)
 class Whereabouts:
     """Keyframes in the map, by id: also those that the map has let go.
@@ -32,6 +34,7 @@ class Whereabouts:
     components: tuple[str, ...]
 
 
+@storable("way")
 @dataclass(frozen=True, slots=True)
 class Way:
     """One robot's. blocks: how many are its own; T_laser_base: where its base is."""
@@ -83,6 +86,9 @@ class Trajectories(Mapping[str, TrajectoryView]):
 
 _NO_IDS: NDArray[np.int64] = np.empty(0, dtype=np.int64)
 _NO_STAMPS, _NO_POSES = np.empty(0), np.empty((0, 3))
+
+
+NO_TRAJECTORIES = Trajectories({}, (), Whereabouts(_NO_POSES, np.empty(0, dtype=np.int32), ()))
 
 
 def _named(names: tuple[str, ...], numbers: NDArray[np.int32]) -> tuple[str, ...]:

@@ -56,20 +56,19 @@ export class LineSet {
   /**
    * Return the set after some lines have come, changed or gone.
    *
-   * @param {LineAnswer[]} changed as they are now
+   * @param {import("./table_change.js").TableChange<LineAnswer>} change
    * @param {Map<string, LineAnswer>} out those of this set that do not stay as they are, by id
    * @param {string[]} robots
    */
-  updated(changed, out, robots) {
+  updated(change, out, robots) {
     const leaving = new Set(out.values());
     if (!this._look.knows(robots)) {
       const staying = this.answers.filter((line) => !leaving.has(line));
-      return LineSet.of([...staying, ...changed], robots);
+      return LineSet.of([...staying, ...change.entries], robots);
     }
-    const rows = new Rows(this.length + changed.length);
-    rows.merge(this, sorted(changed, this._look), leaving);
-    const arrived = changed.filter((line) => !out.has(line.id));
-    return new LineSet(rows.done(), this._look, this, arrived);
+    const rows = new Rows(this.length + change.entries.length);
+    rows.merge(this, sorted(change.entries, this._look), leaving);
+    return new LineSet(rows.done(), this._look, this, change.cameTo(out));
   }
 
   /** Return the number of a line, or -1. @param {string} id */
