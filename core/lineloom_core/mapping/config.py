@@ -208,8 +208,6 @@ class LocaliseConfig:
     spots: int = parameter(
         10, "hypotheses", "that are held against all that is known around them", 1, 1000
     )
-    same_distance: float = parameter(0.5, "m", "within which two hypotheses are one")
-    same_angle: float = parameter(0.15, "rad", "within which two hypotheses are one")
     surround: float = parameter(8.0, "m", "how far around a hypothesis keyframes count", 0.1)
     most_keyframes: int = parameter(16, "keyframes", "of them at most", 1, 1000)
     least_matched: float = parameter(40.0, "points", "(cells of 0.1 m) on known surfaces")

@@ -89,12 +89,12 @@ def recognise(
     table = hypotheses(reference, current, config)
     if len(table) == 0:
         return NOTHING_IN_COMMON
-    if _kernels.place_evidence(table[0, 5], table[0, 6], table[0, 9]) < config.least_overlap:
+    if evidence_of(table[0]) < config.least_overlap:
         return NOTHING_IN_COMMON
     registered = reference.register(current, Pose.from_array(table[0, :3]))
     checks = check_alignment(reference, current, registered)
     checks["overlap"] = float(table[0, 9])
-    evidence = _kernels.place_evidence(checks["matched"], checks["conflict"], table[0, 9])
+    evidence = evidence_for(checks["matched"], checks["conflict"], table[0, 9])
     checks["evidence"] = evidence
     rival = evidence_elsewhere(table, registered.pose, config)
     checks["margin"] = 1.0 - rival / evidence if evidence > 0.0 else 0.0
@@ -151,9 +151,20 @@ def missing_share(matched: float, missing: float) -> float:
     return missing / max(matched + missing, 1.0)
 
 
+def evidence_for(matched: float, conflict: float, overlap: float = 0.0) -> float:
+    """What speaks for an alignment, in metres of wall."""
+    return float(_kernels.place_evidence(matched, conflict, overlap))
+
+
 def evidence_of(row: NDArray[np.float64]) -> float:
     """What speaks for a hypothesis, in metres of wall."""
-    return float(_kernels.place_evidence(row[5], row[6], row[9]))
+    return evidence_for(row[5], row[6], row[9])
+
+
+def is_rival(a: Pose, b: Pose, config: RecognitionConfig, *, slack: float = 0.0) -> bool:
+    """Whether two poses, give or take `slack` m, are two hypotheses rather than one."""
+    turned = abs(angle_difference(a.theta, b.theta)) > config.rival_angle
+    return turned or a.distance(b) > config.rival_distance + slack
 
 
 def rivals(
@@ -162,10 +173,7 @@ def rivals(
     """The best hypothesis at `pose` (give or take `slack` m), and those elsewhere, best first."""
     own, others = None, []
     for row in table:
-        other = Pose.from_array(row[:3])
-        apart = pose.distance(other) > config.rival_distance + slack
-        turned = abs(angle_difference(other.theta, pose.theta)) > config.rival_angle
-        if apart or turned:
+        if is_rival(pose, Pose.from_array(row[:3]), config, slack=slack):
             others.append(row)
         elif own is None:
             own = row

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lineloom_core.checks import LOCALISED
-from lineloom_core.geometry import Pose, angle_difference
+from lineloom_core.geometry import Pose
 from lineloom_core.mapping.answers.localisation import (
     Localisation,
     LocalisationVerdict,
@@ -35,8 +35,10 @@ from lineloom_core.mapping.facts.information import INDEPENDENT_SHARE, turned
 from lineloom_core.places import (
     Place,
     check_alignment,
+    evidence_for,
     evidence_of,
     hypotheses,
+    is_rival,
     share_explained,
 )
 from lineloom_core.scan import Scan
@@ -94,8 +96,7 @@ def _distinct(spots: list[_Spot], config: LocaliseConfig) -> list[_Spot]:
 
 
 def _same(a: Pose, b: Pose, config: LocaliseConfig) -> bool:
-    turned_by = abs(angle_difference(a.theta, b.theta))
-    return a.distance(b) <= config.same_distance and turned_by <= config.same_angle
+    return not is_rival(a, b, config.recognition)
 
 
 def _check(
@@ -107,12 +108,12 @@ def _check(
     )
     guess = T_map_around.between(spot.pose)
     registered = around.register(query, guess)
-    if registered.pose.distance(guess) > config.same_distance:
+    if registered.pose.distance(guess) > config.recognition.rival_distance:
         return None  # it slid to another spot, which stands in the list by itself if it is one
     checks = check_alignment(around, query, registered)
     checks["own_conflict"] = around.own_conflict + query.own_conflict
     checks["explained"] = share_explained(around, query, registered.pose)
-    checks["evidence"] = 0.1 * checks["matched"] - 0.3 * checks["conflict"]
+    checks["evidence"] = evidence_for(checks["matched"], checks["conflict"])
     checks["places"] = float(site.places_in_component(spot.place.anchor))
     return PoseHypothesis(
         component=spot.component,
