@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: install demo test test-long lint bench clean
+.PHONY: install demo test test-long lint bench wheels clean
 
 install: .venv/installed
 
@@ -32,5 +32,8 @@ lint: install
 bench: install
 	$(BIN)/python -m tests.benchmarks.run
 
+wheels: install
+	.ci/wheels
+
 clean:
-	rm -rf .venv out
+	rm -rf .venv out dist

@@ -6,6 +6,7 @@ import asyncio
 import logging
 from functools import partial
 
+from lineloom import wire
 from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.digest import digest
@@ -71,6 +72,7 @@ class Service:
             self.site_figures, self.engine.durations, self._latency.histogram, self.not_ready
         )
         self._warming: asyncio.Task[None] | None = None
+        self._taking = False
 
     async def start(self) -> None:
         """Open the store and begin to map. Readiness comes later.
@@ -87,11 +89,13 @@ class Service:
         self.engine.subscribe(self._latency.on_view)
         await self.conductor.start()
         self.engine.subscribe(self._on_view)
+        self._taking = True
         self._warming = asyncio.create_task(self._warm_up())
         self._warming.add_done_callback(_report_failure)
 
     async def stop(self) -> None:
         """Save and close. What was answered 202 is safe in any case."""
+        self._taking = False
         if self._warming is not None:
             self._warming.cancel()
         self.matcher.close()
@@ -134,8 +138,16 @@ class Service:
         ]
 
     def not_ready(self) -> list[str]:
-        """Return why the service is not ready; empty when it is."""
+        """Return why scans are not mapped, or pairs not matched at once; empty when they are."""
         return self.conductor.not_ready() + self.matcher.not_ready()
+
+    def readiness(self) -> wire.Readiness:
+        """Return whether scans are taken, whether they are mapped, and why not."""
+        missing = self.not_ready()
+        stopped = [] if self._taking else ["the service is not open: it starts or stops"]
+        return wire.Readiness(
+            takes_scans=self._taking, maps=self._taking and not missing, reasons=stopped + missing
+        )
 
 
 def _report_failure(task: asyncio.Task[None]) -> None:

@@ -40,6 +40,14 @@ class Settings(BaseSettings):
     log_level: Literal["debug", "info", "warning", "error"] = "info"
     log_format: Literal["json", "text"] = "json"
 
+    kernels: Literal["auto", "native", "generic"] = Field(
+        default="auto",
+        description="For this processor or for any of its kind; from the environment only.",
+    )
+    kernel_cache: Path | None = Field(
+        default=None, description="Where compiled kernels are kept; from the environment only."
+    )
+
     engine: Literal["standby", "require", "off"] = Field(
         default="standby",
         description="Where another process on the same database maps: wait for its end, refuse to "

@@ -14,7 +14,7 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
-from lineloom_core.warm_up import warm_up
+from lineloom_core.warm_up.drive import warm_up
 
 from tests.benchmarks.drives import driving
 from tests.benchmarks.ingest import ingesting

@@ -13,7 +13,7 @@ from lineloom_core.graph import Edge, Piece, PoseGraph, settle
 from lineloom_core.graph.solver import levenberg_marquardt
 from lineloom_core.mapping.config import PlaceConfig
 from lineloom_core.places import Place, PlaceIndex, recognise
-from lineloom_core.warm_up import warm_up
+from lineloom_core.warm_up.drive import warm_up
 from lineloom_lab.simulation import sick_lms200
 
 from tests.benchmarks.long_drive import growth_along_a_drive, solving_row

@@ -46,7 +46,7 @@ class FakeService:
             if request.method == "POST" and request.url.path.endswith("/scans"):
                 return self._ingest(request)
             if request.url.path == "/readyz":
-                return httpx.Response(200, json={"ready": True, "reasons": []})
+                return httpx.Response(200, json={"takes_scans": True, "maps": True, "reasons": []})
             if request.url.path.count("/") == 3:
                 return self._site(request.url.path.rsplit("/", 1)[1])
         return problem(404, "not-found", "nothing here")(request)

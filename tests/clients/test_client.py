@@ -212,14 +212,15 @@ def test_the_wait_says_what_is_missing(run: Run, fake: FakeService) -> None:
 
 
 def test_not_ready_is_an_answer_and_not_an_error(run: Run, fake: FakeService) -> None:
-    reasons = {"ready": False, "reasons": ["compiling"]}
+    reasons = {"takes_scans": True, "maps": False, "reasons": ["compiling"]}
     fake.failures = [lambda request: httpx.Response(503, json=reasons)]
     state = run("ready", (), {})
-    assert (state.ready, state.reasons) == (False, ["compiling"])
+    assert (state.takes_scans, state.maps, state.reasons) == (True, False, ["compiling"])
     assert len(fake.requests) == 1
     fake.routes["GET", "/readyz"] = lambda request: httpx.Response(503, json=reasons)
+    run("wait_until_ready", (0.1,), {})
     with pytest.raises(NotIdleError, match="compiling"):
-        run("wait_until_ready", (0.1,), {})
+        run("wait_until_ready", (0.1,), {}, maps=True)
 
 
 def test_constraints_come_page_by_page(run: Run, fake: FakeService) -> None:

@@ -286,14 +286,14 @@ async def test_alive_and_ready(client: httpx.AsyncClient) -> None:
     health = (await client.get("/healthz")).json()
     assert health["status"] == "ok"
     for _ in range(1000):
-        response = await client.get("/readyz")
+        response = await client.get("/readyz?maps=true")
         if response.status_code == 200:
             break
         assert response.status_code == 503
         assert response.headers["content-type"] == "application/problem+json"
         assert response.json()["reasons"]
         await asyncio.sleep(0.02)
-    assert response.json() == {"ready": True, "reasons": []}
+    assert response.json() == {"takes_scans": True, "maps": True, "reasons": []}
 
 
 async def test_only_what_changed_since_a_version(

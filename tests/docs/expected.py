@@ -19,7 +19,7 @@ EXPECTED = (
     ("curl -s -X POST $S/constraints/$C/restore", r'"accepted"'),
     ("curl -s $S/exports -H", r'"mapHash"'),
     ("curl -s -X PUT $S/floorplan", r'"registered"'),
-    ("curl -s localhost:8765/readyz", r'"ready": ?true'),
+    ("curl -s localhost:8765/readyz", r'"maps": ?true'),
     ("curl -s localhost:8765/metrics", r"(?m)^lineloom_ready 1"),
     ("lineloom token list", r"ingest"),
     ("lineloom token create", r"\S{30}"),

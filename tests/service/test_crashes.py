@@ -18,7 +18,7 @@ import httpx
 import pytest
 from lineloom_core.io.jsonl import ScanRecord, record_to_json
 from lineloom_core.mapping.answers.site_view import SiteView
-from lineloom_core.warm_up import warm_up
+from lineloom_core.warm_up.drive import warm_up
 from lineloom_lab.simulation import Fleet
 from lineloom_service.engine.mapper import SITE_MAPPER, Mapper, apply, load
 from lineloom_service.store.reads import read_feed, read_skips

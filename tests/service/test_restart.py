@@ -113,7 +113,7 @@ def _reasons_until_ready(port: int) -> set[str]:
     reasons: set[str] = set()
     with httpx.Client(trust_env=False, verify=False) as client:
         for _ in range(3000):
-            answer = client.get(f"http://127.0.0.1:{port}/readyz")
+            answer = client.get(f"http://127.0.0.1:{port}/readyz?maps=true")
             if answer.status_code == 200:
                 return reasons
             assert answer.status_code == 503

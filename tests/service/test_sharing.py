@@ -167,7 +167,7 @@ async def test_a_standby_says_so_and_takes_over_when_the_first_ends(
         async with process(url, tmp_path) as b:
             assert "another mapping engine" in caplog.text
             assert "takes scans, answers, and maps when" in caplog.text
-            await until(lambda: b.get("/readyz"), lambda found: found["ready"])
+            await until(lambda: b.get("/readyz"), lambda found: found["maps"])
             before = await b.map()
             await a.service.stop()
             assert await b.get("/v1/sites/s/map") == before
@@ -285,7 +285,7 @@ async def test_a_question_that_nobody_can_answer_says_so(
         (constraint,) = (await a.get("/v1/sites/s/constraints?state=accepted"))["constraints"]
     async with process(url, tmp_path, engine="off") as b:
         path = f"/v1/sites/s/constraints/{constraint['id']}"
-        await until(lambda: b.get("/readyz"), lambda found: found["ready"])
+        await until(lambda: b.get("/readyz"), lambda found: found["maps"])
         answer = await b.client.post(f"{path}/what-if")
         assert answer.status_code == 503
         assert answer.json()["type"] == "/problems/not-ready"

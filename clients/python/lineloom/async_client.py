@@ -303,17 +303,17 @@ class AsyncClient:
     # Wait
 
     async def ready(self) -> Readiness:
-        """Return whether scans can be taken; never tried again."""
+        """Return whether scans are taken and mapped; never tried again."""
         return await self._send(calls.ready())
 
-    async def wait_until_ready(self, timeout: float = 60.0) -> None:
-        """Wait until the service can take scans, or raise NotIdleError."""
+    async def wait_until_ready(self, timeout: float = 60.0, *, maps: bool = False) -> None:
+        """Wait until scans are taken, and mapped at once where `maps`, or raise NotIdleError."""
         deadline = time.monotonic() + timeout
         while True:
             try:
                 state = await self.ready()
                 reasons = state.reasons
-                if state.ready:
+                if state.maps if maps else state.takes_scans:
                     return
             except ConnectionFailedError as error:
                 reasons = [error.reason]

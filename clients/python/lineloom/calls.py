@@ -239,7 +239,7 @@ def localize(site: str, scans: Sequence[ScanLike]) -> Call[LocalizeAnswer]:
 
 
 def ready() -> Call[Readiness]:
-    """GET whether scans can be taken. Not ready is an answer (503), not an error."""
+    """GET whether scans are taken and mapped. Not ready is an answer (503), not an error."""
 
     def read(response: httpx.Response) -> Readiness:
         if response.status_code not in (HTTPStatus.OK, HTTPStatus.SERVICE_UNAVAILABLE):
@@ -247,7 +247,9 @@ def ready() -> Call[Readiness]:
         try:
             return Readiness.model_validate_json(response.content)
         except ValidationError:
-            return Readiness(ready=False, reasons=[f"status {response.status_code}"])
+            return Readiness(
+                takes_scans=False, maps=False, reasons=[f"status {response.status_code}"]
+            )
 
     return Call("GET", "/readyz", read, retried=False)
 

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from collections.abc import Callable
 from functools import cache
 from hashlib import sha256
+from io import BufferedWriter
 from pathlib import Path
 from typing import Any
+
+try:
+    import fcntl
+except ImportError:  # no Unix: processes may compile the same at once, and the last one's stays
+    fcntl = None  # type: ignore[assignment]
 
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 
@@ -28,6 +35,22 @@ class KernelCache(FunctionCache):
         self._cache_path = self._impl.locator.get_cache_path()
         self._cache_file = _Files(function.__module__, self._impl.filename_base)
         self.enable()
+
+    def _load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Load what was compiled; what another process is compiling just now is waited for."""
+        found = super()._load_overload(sig, target_context)
+        if found is None and self._cache_file.claim(self._index_key(sig, target_context.codegen())):
+            found = super()._load_overload(sig, target_context)
+        return found
+
+    @property
+    def claims(self) -> int:
+        """How many specialisations this process alone may compile now."""
+        return len(self._cache_file.claims)
+
+    def release(self, held: int) -> None:
+        """Keep so many of the claims, and let others compile the rest."""
+        self._cache_file.release(held)
 
     def _index_key(self, sig: Any, codegen: Any) -> tuple[str, str]:
         # A named tuple's type does not know the order of its fields.
@@ -65,6 +88,7 @@ class _Files(IndexDataCacheFile):
         self._own = None if place is None else place / name
         self._shipped = folders.shipped(module.partition(".")[0]) / name
         self._base = base
+        self.claims: list[BufferedWriter] = []
 
     def load(self, key: tuple[str, str]) -> Any:
         """Return what was compiled for a signature, None where there is nothing of use."""
@@ -87,12 +111,35 @@ class _Files(IndexDataCacheFile):
             _tell("no folder can be written")
             return
         try:
-            if not self._own.is_dir():
-                self._own.mkdir(parents=True, exist_ok=True)
-                folders.clean_up(self._own)
+            self._make_folder()
             self._save_data(self._own / self._file(key), (key, data))
         except OSError as error:
             _tell(f"{folders.writable()}: {error.strerror}")
+
+    def claim(self, key: tuple[str, str]) -> bool:
+        """Be the only process that compiles this; False where that cannot be had."""
+        if self._own is None or fcntl is None:
+            return False
+        with contextlib.suppress(OSError):
+            self._make_folder()
+            claim = (self._own / f"{self._file(key)}.lock").open("wb")
+            fcntl.flock(claim, fcntl.LOCK_EX)
+            self.claims.append(claim)
+            return True
+        return False
+
+    def release(self, held: int) -> None:
+        """Give up all claims but the first `held`."""
+        while len(self.claims) > held:
+            claim = self.claims.pop()
+            with contextlib.suppress(OSError):
+                Path(claim.name).unlink()
+            claim.close()
+
+    def _make_folder(self) -> None:
+        if self._own is not None and not self._own.is_dir():
+            self._own.mkdir(parents=True, exist_ok=True)
+            folders.clean_up(self._own)
 
     def _file(self, key: tuple[str, str]) -> str:
         return f"{self._base}-{sha256(repr(key).encode()).hexdigest()[:16]}.nbc"

@@ -45,3 +45,11 @@ class _Kernel(CPUDispatcher):
         """Compile once for all integers, not again for each constant that a caller passes."""
         kws = {name: unliteral(t) for name, t in kws.items()}
         return super().get_call_template([unliteral(t) for t in args], kws)
+
+    def compile(self, sig: Any) -> Any:
+        """Compile or load for a signature; one process compiles and others wait for it."""
+        held = self._cache.claims
+        try:
+            return super().compile(sig)
+        finally:
+            self._cache.release(held)

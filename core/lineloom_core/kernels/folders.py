@@ -74,7 +74,7 @@ def clean_up(folder: Path) -> None:
     A process that still uses one compiles again what it misses.
     """
     module = folder.name.rpartition("-")[0]
-    others = [(_last_use(f), f) for f in folder.parent.parent.glob("*/*") if f != folder]
+    others = [(_last_use(f), f) for f in folder.parent.parent.glob("*/*-*/") if f != folder]
     of_module = [f for _, f in sorted(others) if f.name.rpartition("-")[0] == module]
     beside = [f for f in of_module if f.parent == folder.parent]
     unused = [f for used, f in others if used < time.time() - _UNUSED_S]

@@ -11,6 +11,7 @@ from typing import Any
 
 from lineloom_core.mapping.snapshot import Snapshot
 
+from lineloom_service.engine.compilation import Compilation
 from lineloom_service.engine.current_entry import BUSY, RESTORING
 from lineloom_service.engine.mapper import SITE_MAPPER, WARM_UP
 from lineloom_service.engine.messages import (
@@ -100,6 +101,8 @@ class LocalEngine:
         self._publish_every_s = publish_every_s
         self._patience_s = patience_s
         self._watching: asyncio.Task[None] | None = None
+        self._compilation = Compilation()
+        self._compiling: asyncio.Task[None] | None = None
         self._slots = [_Slot(number) for number in range(workers)]
         self._sites: dict[int, _Site] = {}
         self._listeners: list[ViewListener] = []
@@ -113,11 +116,15 @@ class LocalEngine:
         return [slot.process.pid for slot in self._slots if slot.process is not None]
 
     async def start(self) -> None:
-        """Spawn the workers."""
+        """Have kernels compiled where that has not been done, and spawn the workers."""
         self._stopping = False
+        self._compilation = Compilation()
         for slot in self._slots:
             slot.ready.clear()
-            self._spawn(slot)
+        if self._warm_up == WARM_UP:
+            self._compiling = asyncio.create_task(self._compile(), name="compile-kernels")
+        else:
+            self._spawn_all()
         self._watching = asyncio.create_task(self._watch(), name="watch-workers")
 
     async def stop(self) -> None:
@@ -125,6 +132,9 @@ class LocalEngine:
         self._stopping = True
         if self._watching is not None:
             self._watching.cancel()
+        if self._compiling is not None:
+            self._compiling.cancel()
+            self._compilation.stop()
         for slot in self._slots:
             if slot.process is not None:
                 slot.process.kill()
@@ -144,7 +154,7 @@ class LocalEngine:
 
     def not_ready(self) -> list[str]:
         """Return which workers are not warm yet."""
-        return [
+        return self._compilation.reasons() or [
             f"worker {slot.number} is warming up"
             + (f" again: {slot.last_words}" if slot.last_words else "")
             for slot in self._slots
@@ -254,6 +264,14 @@ class LocalEngine:
             for slot in self._slots:
                 if slot.process is not None:
                     slot.process.kill_if_hung(self._patience_s)
+
+    async def _compile(self) -> None:
+        await self._compilation.until_it_maps()
+        self._spawn_all()
+
+    def _spawn_all(self) -> None:
+        for slot in self._slots:
+            self._spawn(slot)
 
     def _spawn(self, slot: _Slot) -> None:
         if self._stopping or slot.process is not None:

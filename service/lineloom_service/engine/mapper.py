@@ -19,8 +19,8 @@ SITE_MAPPER = "lineloom_core.mapping.site_mapper:SiteMapper"
 QUESTIONS = frozenset({"what_if", "explain", "localise", "rays"})
 """Methods of the mapper that answer and change nothing: what `Engine.ask` may name."""
 
-WARM_UP = "lineloom_core.warm_up:warm_up"
-"""What a worker calls before it is ready: compiles the mapper's kernels."""
+WARM_UP = "lineloom_core.warm_up.drive:warm_up"
+"""What a worker calls before it is ready: loads its kernels, and compiles what is missing."""
 
 
 class Mapper(Protocol):

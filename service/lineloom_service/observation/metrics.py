@@ -122,7 +122,9 @@ class _State(Collector):
     def collect(self) -> Iterator[GaugeMetricFamily | HistogramMetricFamily]:
         """Yield every family."""
         ready = float(not self._not_ready())
-        yield GaugeMetricFamily("lineloom_ready", "1 where /readyz says yes.", value=ready)
+        yield GaugeMetricFamily(
+            "lineloom_ready", "1 where /readyz?maps=true says yes.", value=ready
+        )
         yield from _site_gauges(self._sites())
         yield HistogramMetricFamily(
             "lineloom_processing_latency_seconds",

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Response
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
 from lineloom import wire
 
 from lineloom_service import __version__
@@ -11,6 +13,9 @@ from lineloom_service.dependencies import ServiceDep
 from lineloom_service.errors import NOT_READY, PROBLEM_JSON
 
 router = APIRouter(tags=["status"])
+
+
+_MAPS = "503 until workers are warm and every site's map is as far as before, too."
 
 
 class _NotReady(wire.Problem, wire.Readiness):
@@ -24,18 +29,19 @@ async def healthz() -> Response:
 
 
 @router.get("/readyz", response_model=wire.Readiness)
-async def readyz(service: ServiceDep) -> Response:
-    """Workers are warm, and every site's map is as far as before; 503 says what is not."""
-    reasons = service.not_ready()
-    if not reasons:
-        return answer(wire.Readiness(ready=True, reasons=[]))
+async def readyz(
+    service: ServiceDep, maps: Annotated[bool, Query(description=_MAPS)] = False
+) -> Response:
+    """Scans are taken, and with `maps=true` mapped as well; 503 says what is missing."""
+    state = service.readiness()
+    if state.takes_scans and (state.maps or not maps):
+        return answer(state)
     problem = _NotReady(
         type=f"/problems/{NOT_READY.slug}",
         title=NOT_READY.title,
         status=NOT_READY.status,
-        detail="; ".join(reasons),
-        ready=False,
-        reasons=reasons,
+        detail="; ".join(state.reasons),
+        **state.model_dump(),
     )
     return Response(
         problem.model_dump_json(),

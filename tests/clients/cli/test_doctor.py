@@ -62,7 +62,7 @@ def test_a_server_that_is_well(loopback: str, fake: FakeService) -> None:
 
 def test_a_server_that_warms_up_and_wants_a_token(loopback: str, fake: FakeService) -> None:
     healthy(fake)
-    waiting = {"ready": False, "reasons": ["worker 0 is warming up"]}
+    waiting = {"takes_scans": True, "maps": False, "reasons": ["worker 0 is warming up"]}
     fake.routes["GET", "/readyz"] = lambda _: httpx.Response(503, json=waiting)
     refusal = problem(401, "unauthorized", "a token, please")
     fake.routes["GET", "/v1/sites/lineloom-doctor"] = refusal

@@ -38,7 +38,7 @@ def check_server(session: Session) -> Iterator[Finding]:
             return
         yield _version(session.url, alive)
         yield _clock(alive)
-        yield _ready(http.get("/readyz"))
+        yield _ready(http.get("/readyz?maps=true"))
         yield from _scopes(session, http)
 
 
@@ -67,12 +67,15 @@ def _clock(alive: httpx.Response) -> Finding:
 
 def _ready(answer: httpx.Response) -> Finding:
     if answer.status_code == 200:
-        return ok("ready", "takes scans")
+        return ok("ready", "takes scans and maps them")
     try:
-        reasons = "; ".join(answer.json()["reasons"])
+        state = answer.json()
+        reasons, takes_scans = "; ".join(state["reasons"]), state["takes_scans"] is True
     except (ValueError, KeyError, TypeError):
-        reasons = f"status {answer.status_code}"
-    return wrong("ready", f"takes no scans: {reasons}", "wait; the first start takes a minute")
+        reasons, takes_scans = f"status {answer.status_code}", False
+    if takes_scans:
+        return noted("ready", f"takes scans, maps none yet: {reasons}", "wait; none is lost")
+    return wrong("ready", f"takes no scans: {reasons}", "wait, or look at its log")
 
 
 def _scopes(session: Session, http: httpx.Client) -> Iterator[Finding]:

@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Self
 
@@ -58,8 +59,13 @@ class ChildService:
                 env={k: v for k, v in os.environ.items() if k != "LINELOOM_URL"},
             )
 
-    def wait_until_ready(self, timeout: float = 120.0) -> None:
-        """Wait until scans are taken; a child that dies ends the command with its last words."""
+    def wait_until_ready(
+        self, timeout: float = 120.0, tell: Callable[[str], object] = lambda _: None
+    ) -> None:
+        """Wait until scans are mapped; a child that dies ends the command with its last words.
+
+        tell is given what is missing whenever that changes.
+        """
         deadline = time.monotonic() + timeout
         reasons = ["no answer yet"]
         with Client(self.url, retry=RetryPolicy(attempts=1), timeout=5.0) as client:
@@ -68,8 +74,10 @@ class ChildService:
                     raise CommandError(f"the service did not start: {self.last_words()}")
                 try:
                     state = client.ready()
-                    if state.ready:
+                    if state.maps:
                         return
+                    if state.reasons != reasons:
+                        tell("; ".join(state.reasons))
                     reasons = state.reasons
                 except ConnectionFailedError as error:
                     reasons = [error.reason]

@@ -15,7 +15,7 @@ import typer
 
 from lineloom.cli import options
 from lineloom.cli.child_service import ChildService
-from lineloom.cli.console import note, out, print_json
+from lineloom.cli.console import note, out, print_json, waiting
 from lineloom.cli.failure import Exit
 from lineloom.cli.patience import patient
 from lineloom.cli.player import Played, Player
@@ -79,8 +79,8 @@ def demo(
     )
     with _data(data_dir) as folder, _stopped_by_signals(), ChildService(folder, port) as service:
         note(f"service: starting on {service.url}, data in {folder}")
-        note("The first start on a machine compiles for a minute or so, on a busy one longer.")
-        service.wait_until_ready(_FIRST_START_S)
+        with waiting("The service starts") as tell:
+            service.wait_until_ready(_FIRST_START_S, tell)
         with Client(service.url, retry=patient()) as client:
             truth = Truth()
             played = _drive(client, fleet, truth, timeout)

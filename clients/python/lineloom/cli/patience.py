@@ -21,6 +21,6 @@ def patient() -> RetryPolicy:
 
 def require_ready(client: Client) -> None:
     """Raise ConnectionFailedError at once where nothing answers; let a service warm up."""
-    if not client.ready().ready:
+    if not client.ready().maps:
         note("The service is warming up; its first start on a machine compiles for a minute or so.")
-        client.wait_until_ready(_WARM_UP_S)
+        client.wait_until_ready(_WARM_UP_S, maps=True)

@@ -97,6 +97,8 @@ def serve(
             f"the service is not installed here ({missing or error} is missing): "
             "`pip install lineloom-client[server]`"
         ) from None
+    except ValueError as error:  # kernels are set up as they are imported
+        raise CommandError(f"settings: {error}") from None
     given: dict[str, Any] = {
         "host": host,
         "port": port,

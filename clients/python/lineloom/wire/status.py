@@ -13,7 +13,8 @@ class Health(Answer):
 
 
 class Readiness(Answer):
-    """`ready` means scans are taken and mapped; otherwise `reasons` says what is missing."""
+    """Whether scans are taken, and whether they are mapped as well; `reasons` why not."""
 
-    ready: bool
+    takes_scans: bool
+    maps: bool
     reasons: list[str]
