@@ -44,8 +44,6 @@ class TableChange(Generic[Id, Entry]):
         same: of the caller, who compares several tables.
         """
         alike = same or Same()
-        if before is after:
-            return cls()
         new = {
             id: entry
             for id, entry in after.items()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any, cast, get_args, get_type_hints
 
 from lineloom_core.codec import storable
 from lineloom_core.mapping.answers.site_view import (
@@ -93,16 +93,7 @@ class ViewChange:
 
 
 TABLES: Mapping[str, type] = {
-    "robots": RobotView,
-    "components": ComponentView,
-    "merged_into": str,
-    "lines": MapLine,
-    "keyframes": KeyframeView,
-    "constraints": ConstraintView,
-    "places": PlaceView,
-    "ways": Way,
-    "scans": ScanBlock,
-    "whereabouts": Whereabouts,
+    name: get_args(kind)[1] for name, kind in get_type_hints(ViewChange).items() if get_args(kind)
 }
 """The tables of a view, and what their entries are."""
 
