@@ -17,6 +17,7 @@ from lineloom_core.matching import MatchResult
 from lineloom_core.scan import Mount, Scan
 from numpy.typing import NDArray
 
+from lineloom_service.engine.hosted_site import Remaking
 from lineloom_service.engine.published import Published
 from lineloom_service.relative_pose import RelativePose
 from lineloom_service.store.codec import decode_mount
@@ -48,7 +49,19 @@ def to_mount(mount: wire.MountSettings) -> Mount:
     return Mount(Pose(mount.x, mount.y, mount.theta), mount.inverted)
 
 
-def to_site(record: SiteRecord, published: Published, trouble: str | None) -> wire.Site:
+def to_remaking(remaking: Remaking | None) -> wire.Remaking | None:
+    """Return how far the map is that will be shown instead."""
+    if remaking is None:
+        return None
+    return wire.Remaking(position=remaking.position, of=remaking.of, why=remaking.why)
+
+
+def to_site(
+    record: SiteRecord,
+    published: Published,
+    trouble: str | None,
+    remaking: wire.Remaking | None = None,
+) -> wire.Site:
     """Return how a site is doing. trouble: why it is not mapped just now."""
     view = published.view
     constraints: dict[str, dict[str, int]] = {}
@@ -68,6 +81,7 @@ def to_site(record: SiteRecord, published: Published, trouble: str | None) -> wi
         merged_into=dict(view.merged_into),
         constraints=constraints,
         trouble=trouble,
+        remaking=remaking,
     )
 
 

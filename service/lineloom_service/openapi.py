@@ -16,6 +16,7 @@ _MODELS = (
     wire.Scan,
     wire.ScanBatch,
     wire.RobotSettings,
+    wire.ConfigChange,
     wire.MatchRequest,
     wire.ExportRequest,
     wire.MatchScan,

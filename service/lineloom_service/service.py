@@ -8,8 +8,6 @@ from functools import partial
 
 from lineloom import wire
 from lineloom_core.mapping.answers.site_view import SiteView
-from lineloom_core.mapping.config import MapperConfig
-from lineloom_core.mapping.digest import digest
 
 from lineloom_service.body_budget import BodyBudget
 from lineloom_service.engine.conductor import Conductor
@@ -54,9 +52,7 @@ class Service:
             patience_s=settings.entry_timeout_s,
         )
         self.events = EventHub()
-        recorder = EventRecorder(
-            self.store, self.events, digest(MapperConfig()), settings.event_history
-        )
+        recorder = EventRecorder(self.store, self.events, settings.event_history)
         self.conductor = Conductor(self.store, self.engine, settings, recorder)
         self.pacer = Pacer()
         self.bodies = BodyBudget(settings.max_bodies_bytes)
@@ -86,9 +82,9 @@ class Service:
             await self.store.close()
             raise
         self.store.subscribe(self._latency.on_commit)
-        self.engine.subscribe(self._latency.on_view)
+        self.conductor.subscribe(self._latency.on_view)
+        self.conductor.subscribe(self._on_view)
         await self.conductor.start()
-        self.engine.subscribe(self._on_view)
         self._taking = True
         self._warming = asyncio.create_task(self._warm_up())
         self._warming.add_done_callback(_report_failure)
@@ -132,9 +128,11 @@ class Service:
                 max(0, record.position - published.position),
                 record.held,
                 published.view,
+                0 if remaking is None else max(0, remaking.of - remaking.position),
             )
             for record in self._sites_seen
             for published in [self.conductor.published(record.id)]
+            for remaking in [self.conductor.remaking(record.id)]
         ]
 
     def not_ready(self) -> list[str]:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import os
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from lineloom.wire import MAX_BATCH, MAX_BODY_BYTES
+from lineloom_core.mapping.config import MapperConfig
 from pydantic import Field, field_validator, model_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
+
+from lineloom_service.parameter_file import read_config
 
 
 def _default_workers() -> int:
@@ -52,6 +56,9 @@ class Settings(BaseSettings):
         default="standby",
         description="Where another process on the same database maps: wait for its end, refuse to "
         "start, or never map at all.",
+    )
+    mapper_config: Path | None = Field(
+        default=None, description="Parameters of the mapper, TOML; of sites that name none."
     )
     workers: int = Field(default_factory=_default_workers, ge=1, le=64)
     max_body_bytes: int = Field(default=MAX_BODY_BYTES, ge=1024)
@@ -122,6 +129,13 @@ class Settings(BaseSettings):
         default=1000.0, gt=0.0, description="Bytes a second at which a body has to come."
     )
 
+    @field_validator("mapper_config")
+    @classmethod
+    def _check_parameters(cls, value: Path | None) -> Path | None:
+        if value is not None:
+            read_config(value)
+        return value
+
     @field_validator("allow_origins", mode="before")
     @classmethod
     def _split(cls, value: object) -> object:
@@ -140,6 +154,11 @@ class Settings(BaseSettings):
         if self.max_bodies_bytes < 2 * self.max_body_bytes:
             raise ValueError("max_bodies_bytes must hold one body of max_body_bytes, twice")
         return self
+
+    @cached_property
+    def mapper(self) -> MapperConfig:
+        """The parameters of the file, and the defaults of the others."""
+        return MapperConfig() if self.mapper_config is None else read_config(self.mapper_config)
 
     @property
     def database_path(self) -> Path:

@@ -41,6 +41,7 @@ from lineloom_core.mapping.answers.site_view import (
 from lineloom_core.mapping.answers.trajectories import Trajectories, Way, Whereabouts
 from lineloom_core.mapping.belief.constraint_state import StateChange
 from lineloom_core.mapping.changes import Changes
+from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.facts.placed_scans import ScanBlock
 from lineloom_core.mapping.facts.unplaced_scan import UnplacedScan
 from lineloom_core.mapping.snapshot import Snapshot
@@ -69,8 +70,10 @@ class FakeMapper:
     Its history is every scan it took, whoever was forgotten since, sealed in chapters.
     """
 
-    def __init__(self) -> None:
-        self._chain = b""
+    def __init__(self, config: MapperConfig | None = None) -> None:
+        # What it was made with shows in every line, and in how much a constraint counts.
+        self._least_set = (config or MapperConfig()).join.least_set
+        self._chain = b"" if self._least_set == 3 else bytes([self._least_set])
         self._version = 0
         self._latest = 0.0
         self._history: list[tuple[str, str, int, float]] = []
@@ -102,6 +105,9 @@ class FakeMapper:
         self._version += 1
         self._link(robot, repr(mount), b"")
         self._mounts[robot] = mount
+
+    def note(self) -> None:
+        self._version += 1
 
     def forget(self, robot: str) -> None:
         self._version += 1
@@ -217,7 +223,7 @@ class FakeMapper:
         return RobotView(
             robot=robot,
             component=_component(robot),
-            pose=Pose(float(len(self._scans[robot])), 0.0, 0.0),
+            pose=Pose(float(len(self._scans[robot])), self._least_set - 3.0, 0.0),
             covariance=np.diag([0.01, 0.01, 0.001]),
             state="tracking",
             scans_processed=len(self._scans[robot]),

@@ -15,6 +15,8 @@ from lineloom_core.scan import Scan
 from lineloom_service.engine.conductor import Conductor
 from lineloom_service.engine.local_engine import LocalEngine
 from lineloom_service.engine.published import Published
+from lineloom_service.events.hub import EventHub
+from lineloom_service.events.recorder import EventRecorder
 from lineloom_service.settings import Settings
 from lineloom_service.store.actions import append_scans
 from lineloom_service.store.choice import database_at
@@ -23,7 +25,7 @@ from lineloom_service.store.records import NewScan
 from lineloom_service.store.sql_store import SqlStore
 
 FAKE = "fake_mapper:FakeMapper"
-PRODUCER = digest(MapperConfig())
+PRODUCER = f"{digest(MapperConfig())}@0"
 """What snapshots are keyed by."""
 
 
@@ -45,7 +47,9 @@ def new_scan(seq: int, stamp: float | None = None) -> NewScan:
 class System:
     """A service without its web side."""
 
-    def __init__(self, path: Path, database_url: str | None, **changes: object) -> None:
+    def __init__(
+        self, path: Path, database_url: str | None, *, records: bool = False, **changes: object
+    ) -> None:
         values: dict[str, object] = {
             "data_dir": path,
             "database_url": database_url,
@@ -68,7 +72,9 @@ class System:
             mapper=FAKE,
             warm_up=None,
         )
-        self.conductor = Conductor(self.store, self.engine, self.settings)
+        self.hub = EventHub()
+        recorder = EventRecorder(self.store, self.hub, 1000) if records else None
+        self.conductor = Conductor(self.store, self.engine, self.settings, recorder)
 
     async def post(self, seqs: range, *, stamps: dict[int, float] | None = None) -> None:
         scans = [new_scan(seq, (stamps or {}).get(seq)) for seq in seqs]
@@ -95,9 +101,11 @@ class System:
 
 
 @asynccontextmanager
-async def running(path: Path, database_url: str | None, **changes: object) -> AsyncIterator[System]:
+async def running(
+    path: Path, database_url: str | None, *, records: bool = False, **changes: object
+) -> AsyncIterator[System]:
     """A system that is started, and in the end stopped."""
-    async with started(System(path, database_url, **changes)) as system:
+    async with started(System(path, database_url, records=records, **changes)) as system:
         yield system
 
 

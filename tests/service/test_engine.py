@@ -8,6 +8,7 @@ import signal
 import sys
 from contextlib import AbstractAsyncContextManager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -31,7 +32,7 @@ def on_each_database(database_url: str | None, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(sys.modules[__name__], "DATABASE_URL", database_url)
 
 
-def _running(path: Path, **changes: object) -> AbstractAsyncContextManager[System]:
+def _running(path: Path, **changes: Any) -> AbstractAsyncContextManager[System]:
     return running(path, DATABASE_URL, **changes)
 
 

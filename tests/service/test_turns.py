@@ -75,7 +75,7 @@ def test_a_new_start_voids_what_waits() -> None:
     turns.put(_feed(1))
     turns.put(Chapter(1, 2, b"history"))
     assert isinstance(turns.next(), Chapter)
-    turns.put(StartSite(1, 2, 0, None))
+    turns.put(StartSite(1, 2, 0, None, {}))
     assert isinstance(turns.next(), StartSite)
     turns.put(StopSite(1))
     assert isinstance(turns.next(), StopSite)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 import itertools
 import time
-from collections.abc import AsyncIterator, Callable, Iterable, Sequence
-from typing import Literal, Self, TypeVar
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
+from typing import Any, Literal, Self, TypeVar
 
 import httpx
 
-from lineloom import calls, event_stream, export_calls
+from lineloom import calls, config_calls, event_stream, export_calls
 from lineloom.calls import Box, Call, Encoding, MapOptions
 from lineloom.errors import ConnectionFailedError
 from lineloom.retry import RetryPolicy
@@ -34,10 +34,12 @@ from lineloom.wire import (
     MountSettings,
     PlanDifferences,
     Readiness,
+    RemadeEvent,
     Robot,
     RobotList,
     Scan,
     Site,
+    SiteConfig,
     SiteList,
     Trajectory,
     Transform,
@@ -197,6 +199,21 @@ class AsyncClient:
         await self._send(export_calls.delete_export(site, export))
 
     # Floor plan
+
+    async def config(self, site: str) -> SiteConfig:
+        """Return every parameter that a site's map is made with."""
+        return await self._send(config_calls.config(site))
+
+    async def set_config(self, site: str, parameters: Mapping[str, Any]) -> SiteConfig:
+        """Set a site's own parameters, nested by name, in place of those set before.
+
+        `effect` of the answer says what follows: mostly that the map is made anew.
+        """
+        return await self._send(config_calls.put_config(site, parameters))
+
+    async def config_difference(self, site: str) -> RemadeEvent:
+        """Return what changed when the map was last made anew."""
+        return await self._send(config_calls.difference(site))
 
     async def put_floorplan(self, site: str, content: bytes, media_type: str) -> FloorPlanAnswer:
         """Send the building's plan, and return where in it the map lies, or why that is open.

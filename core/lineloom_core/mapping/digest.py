@@ -20,7 +20,7 @@ from lineloom_core.parameters import values
 NOT_RUN = ("io/", "floorplan/", "matching/thesis/", "warm_up/")
 """What of this package the mapper does without; a test holds it to what it imports."""
 
-_LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "gtsam")
+_LIBRARIES = ("numpy", "scipy", "gtsam")
 
 
 def digest(config: MapperConfig) -> str:

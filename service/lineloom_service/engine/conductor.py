@@ -7,20 +7,21 @@ wait for their turn.
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 from typing import Any
 
 from lineloom_core.mapping.answers.site_view import SiteView
-from lineloom_core.mapping.config import MapperConfig
-from lineloom_core.mapping.digest import digest
 
 from lineloom_service.engine.forwarding import Forwarding
-from lineloom_service.engine.protocol import Engine, Recorder
+from lineloom_service.engine.hosted_site import HostedSite, Means, Remaking
+from lineloom_service.engine.making import site_of
+from lineloom_service.engine.protocol import Engine, Recorder, ViewListener, WorkerDiedError
 from lineloom_service.engine.published import NOTHING, Published
 from lineloom_service.engine.shared_views import SharedViews
 from lineloom_service.engine.site_runner import Pace, SiteRunner
 from lineloom_service.settings import Settings
+from lineloom_service.site_config import first_config, to_order
+from lineloom_service.store.actions import begin_sites_with, configure
 from lineloom_service.store.database import Claim, ClaimedError
 from lineloom_service.store.protocol import NewsKind, Store
 from lineloom_service.store.records import SiteRecord, Skip, StoreError
@@ -32,7 +33,7 @@ _AGAIN_S = 1.0
 
 
 class Conductor:
-    """One SiteRunner per site while it is this process that maps; the latest view of each."""
+    """All sites while it is this process that maps; the latest view of each."""
 
     def __init__(
         self,
@@ -44,13 +45,15 @@ class Conductor:
         self._store = store
         self._engine = engine
         self._recorder = recorder
-        self._pace = Pace(settings.chunk, settings.snapshot_every, settings.snapshot_idle_s)
+        pace = Pace(settings.chunk, settings.snapshot_every, settings.snapshot_idle_s)
         self._stop_grace_s = settings.stop_grace_s
         self._mode = settings.engine
-        self._runners: dict[int, SiteRunner] = {}
-        self._tasks: dict[int, asyncio.Task[None]] = {}
+        self._base = settings.mapper
+        self._sites: dict[int, HostedSite] = {}
         self._views = SharedViews(store)
-        self._forwarding = Forwarding(store, engine.ask)
+        self._means = Means(store, engine, pace, recorder, self._views.save, self._views.load)
+        self._listeners: list[ViewListener] = []
+        self._forwarding = Forwarding(store, self._ask_here)
         self._turns: asyncio.Task[None] | None = None
         self._forgetting: set[asyncio.Task[None]] = set()
         self._mapping = self._was_standby = False
@@ -62,6 +65,7 @@ class Conductor:
 
     async def start(self) -> None:
         """Map every site that the store knows, or answer from what another process maps."""
+        await self._store.write(begin_sites_with, first_config(self._base))
         self._store.subscribe(self._on_commit)
         self._store.subscribe_news(self._on_news)
         self._engine.subscribe(self._on_view)
@@ -83,8 +87,8 @@ class Conductor:
         if self._turns is not None:
             self._turns.cancel()
             await asyncio.gather(self._turns, return_exceptions=True)
-        await self._end_runners()
-        savings = [asyncio.ensure_future(runner.finish()) for runner in self._runners.values()]
+        runners = await self._end_sites()
+        savings = [asyncio.ensure_future(runner.finish()) for runner in runners]
         if savings:
             _, late = await asyncio.wait(savings, timeout=self._stop_grace_s)
             for saving in late:
@@ -99,8 +103,8 @@ class Conductor:
 
     def published(self, site_id: int) -> Published:
         """Return the latest view of a site; never waits."""
-        runner = self._runners.get(site_id)
-        here = NOTHING if runner is None or runner.published is None else runner.published
+        site = self._sites.get(site_id)
+        here = NOTHING if site is None else site.published
         elsewhere = self._views.get(site_id) or NOTHING
         # After taking over, what the former one published stands until our own map is as far.
         return here if here.position >= elsewhere.position else elsewhere
@@ -110,10 +114,23 @@ class Conductor:
 
         Raises WorkerDiedError where it is not running, QuestionFailedError where it cannot say.
         """
-        asked = (
-            self._engine.ask if self._mapping or not self._store.shared else self._forwarding.ask
-        )
+        asked = self._ask_here if self._mapping or not self._store.shared else self._forwarding.ask
         return await asked(site_id, question, *arguments)
+
+    async def _ask_here(self, site_id: int, question: str, *arguments: object) -> Any:
+        site = self._sites.get(site_id)
+        if site is None:
+            raise WorkerDiedError(None, "the site is not hosted yet", killed=False)
+        return await self._engine.ask(site.host(), question, *arguments)
+
+    def subscribe(self, listener: ViewListener) -> None:
+        """Have `listener` told of the views that are shown, after they are."""
+        self._listeners.append(listener)
+
+    def remaking(self, site_id: int) -> Remaking | None:
+        """Return how far the map is that will be shown instead; None where none is made."""
+        site = self._sites.get(site_id)
+        return None if site is None else site.remaking
 
     async def reached(self, site_id: int, position: int, within_s: float) -> bool:
         """Wait until the published view holds the entry at `position`; False if it takes longer."""
@@ -126,14 +143,14 @@ class Conductor:
 
     def processed(self, site_id: int) -> int:
         """Return the position that the mapper is known to be through: often beyond the view's."""
-        runner = self._runners.get(site_id)
-        done = 0 if runner is None else runner.done
+        site = self._sites.get(site_id)
+        done = 0 if site is None else site.done
         return max(done, self.published(site_id).position)
 
     def trouble(self, site_id: int) -> str | None:
         """Return why a site is not mapped just now, None where all is well."""
-        runner = self._runners.get(site_id)
-        return None if runner is None else runner.trouble
+        site = self._sites.get(site_id)
+        return None if site is None else site.trouble
 
     def skips(self, site_id: int) -> list[Skip]:
         """Return the entries of a site that are not in its map for good."""
@@ -144,23 +161,9 @@ class Conductor:
         unseen = [f"the view of site {site} is being loaded" for site in self._views.waiting()]
         if self._was_standby or not self._mapping:
             return unseen  # taking over, it goes on answering
-        reasons = [
-            f"site {runner.name} is being resumed"
-            + (
-                f": entry {runner.done} of {runner.expected}"
-                if runner.done < runner.expected
-                else ""
-            )
-            for runner in self._runners.values()
-            if self._is_restoring(runner)
-        ]
+        found = (s.unfinished(self.published(i).position) for i, s in self._sites.items())
+        reasons = [reason for reason in found if reason is not None]
         return self._engine.not_ready() + reasons + unseen
-
-    def _is_restoring(self, runner: SiteRunner) -> bool:
-        # One site in trouble does not keep the others from being served.
-        if runner.new or runner.trouble is not None:
-            return False
-        return runner.published is None or self.published(runner.site).position < runner.expected
 
     async def _first_claim(self) -> Claim | None:
         try:
@@ -188,66 +191,49 @@ class Conductor:
             await claim.lost.wait()
             claim = None
             _LOG.error("the database has ended our right to map; waiting for the next turn")
-            await self._end_runners()
-            self._runners.clear()
+            await self._end_sites()
+            self._sites.clear()
             await self._engine.stop()
             if self._recorder is not None:
                 self._recorder.release()
 
     async def _begin(self) -> None:
         await self._engine.start()
+        for record in await self._store.sites():
+            told = None if self._recorder is None else await self._recorder.told_of(record.id)
+            ordered = to_order(record, self._base, told)
+            if ordered is not None:
+                await self._store.write_as_engine(configure, record.name, ordered)
         records = await self._store.sites()
         self._mapping = True
         for record in records:
-            if record.id not in self._runners:
-                self._runner(record)
+            if record.id not in self._sites:
+                self._sites[record.id] = HostedSite(record, self._means)
 
-    async def _end_runners(self) -> None:
+    async def _end_sites(self) -> list[SiteRunner]:
         self._mapping = False
-        for task in self._tasks.values():
-            task.cancel()
-        await asyncio.gather(*self._tasks.values(), return_exceptions=True)
-        self._tasks.clear()
+        ended = await asyncio.gather(*(site.end() for site in self._sites.values()))
+        return [runner for runners in ended for runner in runners]
 
     async def forget_site(self, site_id: int) -> None:
         """Stop mapping a site that was deleted."""
-        self._runners.pop(site_id, None)
-        task = self._tasks.pop(site_id, None)
-        if task is not None:
-            task.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await task
-        self._engine.stop_site(site_id)
+        site = self._sites.pop(site_id, None)
+        if site is not None:
+            await site.forget()
         self._views.forget_site(site_id)
         if self._recorder is not None:
             self._recorder.forget_site(site_id)
-
-    def _runner(self, record: SiteRecord, *, new: bool = False) -> SiteRunner:
-        runner = SiteRunner(
-            record,
-            self._store,
-            self._engine,
-            self._pace,
-            digest(MapperConfig()),
-            self._recorder,
-            new=new,
-        )
-        self._runners[record.id] = runner
-        task = asyncio.create_task(runner.run(), name=f"site-{record.name}")
-        task.add_done_callback(_report_end)
-        self._tasks[record.id] = task
-        return runner
 
     def _on_commit(self, record: SiteRecord) -> None:
         if record.deleted:
             forgetting = asyncio.create_task(self.forget_site(record.id))
             self._forgetting.add(forgetting)
             forgetting.add_done_callback(self._forgetting.discard)
-        elif (runner := self._runners.get(record.id)) is not None:
-            runner.on_commit(record)
+        elif (site := self._sites.get(record.id)) is not None:
+            site.on_commit(record)
         elif self._mapping:
             # New: nothing to resume, so it does not keep the service from being ready.
-            self._runner(record, new=True)
+            self._sites[record.id] = HostedSite(record, self._means, new=True)
 
     def _on_news(self, kind: NewsKind, key: str) -> None:
         if kind == "view" and not self._mapping:
@@ -257,20 +243,17 @@ class Conductor:
         elif kind == "question" and self._mapping:
             self._forwarding.on_question(key)
 
-    def _on_view(self, site_id: int, position: int, view: SiteView) -> None:
-        runner = self._runners.get(site_id)
-        if runner is None:
+    def _on_view(self, host: int, position: int, view: SiteView) -> None:
+        site_id = site_of(host)
+        site = self._sites.get(site_id)
+        if site is None or not site.on_view(host, position, view):
             return
-        runner.on_view(position, view)
-        if self._store.shared and runner.published is not None:
-            self._views.save(site_id, runner.published)
+        if self._store.shared:
+            self._views.save(site_id, site.published)
+        for listener in self._listeners:
+            listener(site_id, position, view)
 
-    def _on_view_failed(self, site_id: int, position: int, reason: str) -> None:
-        runner = self._runners.get(site_id)
-        if runner is not None:
-            runner.on_view_failed(position, reason)
-
-
-def _report_end(task: asyncio.Task[None]) -> None:
-    if not task.cancelled() and task.exception() is not None:
-        _LOG.critical("%s is no longer mapped", task.get_name(), exc_info=task.exception())
+    def _on_view_failed(self, host: int, position: int, reason: str) -> None:
+        site = self._sites.get(site_of(host))
+        if site is not None:
+            site.on_view_failed(host, position, reason)

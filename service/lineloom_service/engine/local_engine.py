@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import deque
-from collections.abc import AsyncIterator, Awaitable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -171,6 +171,7 @@ class LocalEngine:
         position: int,
         state: bytes | None,
         chapters: AsyncIterator[bytes] | None = None,
+        parameters: Mapping[str, Any] | None = None,
     ) -> None:
         """Host a site on the worker that has fewest, or on the one that has it already."""
         hosted = self._sites.get(site)
@@ -185,7 +186,7 @@ class LocalEngine:
         if chapters is not None:
             await self._gather(site, hosted, chapters)
             hosted.gathering = False
-        await self._ask(hosted, StartSite(site, hosted.run, position, state))
+        await self._ask(hosted, StartSite(site, hosted.run, position, state, parameters or {}))
 
     async def _gather(self, site: int, hosted: _Site, chapters: AsyncIterator[bytes]) -> None:
         """Send chapters to the process that is there now, each when it has the one before."""

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 
 from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_core.mapping.changes import Changes
+from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.snapshot import Snapshot
 from lineloom_core.scan import Mount, Scan
 
@@ -46,6 +47,10 @@ class Mapper(Protocol):
         """Take a retraction back."""
         ...
 
+    def note(self) -> None:
+        """Take an entry that changes nothing."""
+        ...
+
     def view(self) -> SiteView:
         """Return all that is known now."""
         ...
@@ -58,7 +63,7 @@ class Mapper(Protocol):
 class MapperFactory(Protocol):
     """The mapper's class."""
 
-    def __call__(self) -> Mapper:
+    def __call__(self, config: MapperConfig, /) -> Mapper:
         """Make a mapper that knows nothing."""
         ...
 
@@ -75,6 +80,9 @@ def load(path: str) -> Any:
 
 def apply(mapper: Mapper, entry: LogEntry) -> None:
     """Feed one log entry."""
+    if entry.kind == "config":
+        mapper.note()
+        return
     if entry.kind == "forget":
         mapper.forget(entry.robot)
         return

@@ -6,7 +6,9 @@ no longer of interest.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_core.mapping.snapshot import Snapshot
@@ -27,12 +29,16 @@ class Chapter:
 
 @dataclass(frozen=True, slots=True)
 class StartSite:
-    """Host a site. state: of a snapshot that goes on from the chapters that came before."""
+    """Host a site. state: of a snapshot that goes on from the chapters that came before.
+
+    parameters: of a mapper that begins with nothing; a snapshot has its own.
+    """
 
     site: int
     run: int
     position: int
     state: bytes | None
+    parameters: Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)

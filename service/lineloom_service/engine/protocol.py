@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from lineloom_core.mapping.answers.site_view import SiteView
@@ -12,11 +13,22 @@ from lineloom_service.observation.durations import Durations
 from lineloom_service.store.records import LogEntry
 
 ViewListener = Callable[[int, int, SiteView], None]
-"""Called on the event loop with site id, position and the view after the entry at position."""
+"""Called on the event loop with a site, its position and the view after the entry at position."""
 
 
 FailureListener = Callable[[int, int, str], None]
-"""Called on the event loop with site id, position and why there is no view after the entry."""
+"""Called on the event loop with a site, its position and why there is no view after the entry."""
+
+
+@dataclass(frozen=True, slots=True)
+class Remade:
+    """A map that takes another's place. before: the view that was shown. why: it was made anew."""
+
+    position: int
+    view: SiteView
+    making: str
+    before: SiteView
+    why: str
 
 
 class MapperFailedError(Exception):
@@ -57,6 +69,8 @@ class WorkerDiedError(Exception):
 class Engine(Protocol):
     """Hosts one mapper per site, each fed by one caller in the order of the log.
 
+    site: a number that the caller gives to each; one that is made anew beside itself has two
+    (`engine.making`).
     Every call about a site may raise WorkerDiedError.
     """
 
@@ -90,12 +104,14 @@ class Engine(Protocol):
         position: int,
         state: bytes | None,
         chapters: AsyncIterator[bytes] | None = None,
+        parameters: Mapping[str, Any] | None = None,
     ) -> None:
         """Host a site from a snapshot taken after the entry at `position`, or from nothing.
 
         state: as `snapshot` returned it. chapters: all that it goes on from, in order; one is read
         when the one before has arrived where the site is hosted, and what reading raises passes
-        through. Replaces the site's mapper where there is one. Raises ResumeFailedError.
+        through. parameters: of a mapper that begins with nothing. Replaces the site's mapper where
+        there is one. Raises ResumeFailedError.
         """
         ...
 
@@ -139,6 +155,10 @@ class Engine(Protocol):
 class Recorder(Protocol):
     """Keeps what published views tell, beside the mapping."""
 
+    async def told_of(self, site_id: int) -> str | None:
+        """Return what the map was made with that was told of last (`Making.id`), None: nothing."""
+        ...
+
     async def recorded_position(self, site_id: int) -> int:
         """Return the position up to which a site is recorded: its view there has to be published.
 
@@ -146,8 +166,12 @@ class Recorder(Protocol):
         """
         ...
 
-    def on_view(self, site_id: int, position: int, view: SiteView) -> None:
-        """Take a published view; never waits."""
+    def on_view(self, site_id: int, position: int, view: SiteView, making: str) -> None:
+        """Take a published view; never waits. making: what it was made with."""
+        ...
+
+    def on_remade(self, site_id: int, made: Remade) -> None:
+        """Take the first view of a map that takes another's place; never waits."""
         ...
 
     async def settled(self, site_id: int) -> None:

@@ -51,6 +51,15 @@ class SharedViews:
         self._wanted.add(site_id)
         self._run("fetch", site_id)
 
+    async def load(self, site_id: int) -> Published | None:
+        """Return the view that was saved last, by whatever code; None where none can be read."""
+        record = await self._store.read(read_view, site_id, -1)
+        try:
+            return None if record is None else await asyncio.to_thread(ViewReader().read, record)
+        except ValueError as error:
+            _LOG.warning("site %d: %s", site_id, error)
+            return None
+
     def forget_site(self, site_id: int) -> None:
         """A site was deleted."""
         for kind in ("save", "fetch"):

@@ -6,10 +6,12 @@ import asyncio
 import logging
 import time
 from collections import Counter, deque
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from lineloom_core.mapping.answers.site_view import SiteView
 
+from lineloom_service.engine.making import Making, host_of
 from lineloom_service.engine.protocol import (
     Engine,
     MapperFailedError,
@@ -75,13 +77,16 @@ class SiteRunner:
         store: Store,
         engine: Engine,
         pace: Pace,
-        producer: str,
+        making: Making,
         recorder: Recorder | None = None,
         *,
-        new: bool = False,
+        generation: int = 0,
+        on_saved: Callable[[SiteRunner], None] = lambda _: None,
     ) -> None:
-        self.new = new
-        """Nothing of it was ever answered, so there is nothing to resume."""
+        self._on_saved = on_saved
+        self.making = making
+        self.host = host_of(record.id, generation)
+        """The engine's number for it."""
         self.site = record.id
         self.name = record.name
         self.skips: dict[int, Skip] = {}
@@ -92,7 +97,6 @@ class SiteRunner:
         self._store = store
         self._engine = engine
         self._pace = pace
-        self._producer = producer
         self._recorder = recorder
         self._recorded = 0
         self._wake = asyncio.Event()
@@ -132,7 +136,7 @@ class SiteRunner:
         self._marks = {at: n for at, n in self._marks.items() if at >= position}
         self._troubles.pop("view", None)
         if self._recorder is not None:
-            self._recorder.on_view(self.site, position, view)
+            self._recorder.on_view(self.site, position, view, self.making.id)
 
     def on_view_failed(self, position: int, reason: str) -> None:
         """The last view stands."""
@@ -168,15 +172,15 @@ class SiteRunner:
         if self._recorder is not None:
             # Events are never behind the snapshots: a restart finds the view they go on from.
             await self._engine.feed(
-                self.site, [], self._done, caught_up=self._done >= self._end, publish=True
+                self.host, [], self._done, caught_up=self._done >= self._end, publish=True
             )
             await self._recorder.settled(self.site)
         try:
-            taken = await self._engine.snapshot(self.site, self._chapters)
+            taken = await self._engine.snapshot(self.host, self._chapters)
             record = SnapshotRecord(
                 self._done,
                 self._scans_done,
-                self._producer,
+                self.making.id,
                 taken.state,
                 taken.first,
                 taken.chapters,
@@ -190,6 +194,11 @@ class SiteRunner:
         else:
             self._troubles.pop("saving", None)
             self._saved, self._chapters = self._done, record.end
+            self._on_saved(self)
+
+    def serve(self, recorder: Recorder | None) -> None:
+        """Be the one that is shown from now on."""
+        self._recorder = recorder
 
     async def finish(self) -> None:
         """After `run` was cancelled: wait for what is under way and save."""
@@ -216,7 +225,7 @@ class SiteRunner:
 
     async def _resume(self) -> None:
         """Start from the latest snapshot, or from nothing."""
-        snapshot = await self._store.read(read_snapshot, self.site, self._producer)
+        snapshot = await self._store.read(read_snapshot, self.site, self.making.id)
         self._saved = 0 if snapshot is None else snapshot.position
         self._chapters = 0 if snapshot is None else snapshot.end
         self._scans_sent = self._scans_done = 0 if snapshot is None else snapshot.scans
@@ -226,10 +235,11 @@ class SiteRunner:
         self._marks = {self._done: self._scans_done}
         self._under_way.clear()
         if snapshot is None:
-            await self._engine.start_site(self.site, 0, None)
+            parameters = self.making.parameters
+            await self._engine.start_site(self.host, 0, None, parameters=parameters)
         else:
             chapters = read_chapters(self._store, self.site, snapshot)
-            await self._engine.start_site(self.site, self._saved, snapshot.data, chapters)
+            await self._engine.start_site(self.host, self._saved, snapshot.data, chapters)
 
     async def _send(self) -> None:
         # The next events go on from the view right there, so that view has to be published.
@@ -239,19 +249,24 @@ class SiteRunner:
         if not entries:  # the site was deleted: its runner is about to be stopped
             self._end = self._sent
             return
-        wanted: list[LogEntry] = [e for e in entries if e.position not in self.skips]
+        wanted: list[LogEntry] = [e for e in entries if self._is_for_it(e)]
         self._troubles.pop("log", None)
         self._sent = entries[-1].position
         self._scans_sent += sum(entry.kind == "scan" for entry in wanted)
         self._marks[self._sent] = self._scans_sent
         answer = self._engine.feed(
-            self.site,
+            self.host,
             wanted,
             self._sent,
             caught_up=self._sent >= self._end,
             publish=self._sent == self._recorded,
         )
         self._under_way.append((asyncio.ensure_future(answer), self._sent, self._scans_sent))
+
+    def _is_for_it(self, entry: LogEntry) -> bool:
+        # What orders another making is not for this one: so the other's version is the greater.
+        later = entry.kind == "config" and entry.position > self.making.since
+        return entry.position not in self.skips and not later
 
     async def _await_one(self) -> None:
         answer, position, scans = self._under_way[0]

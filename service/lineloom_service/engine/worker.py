@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
 
 from lineloom_core import timing
+from lineloom_core.mapping.config import config_from
 from lineloom_core.mapping.snapshot import Snapshot
 
 from lineloom_service.allocator import trim
@@ -164,7 +165,7 @@ class Worker:
         self._current.mark(order.site, RESTORING)
         try:
             if order.state is None:
-                mapper = self._factory()
+                mapper = self._factory(config_from(order.parameters))
             else:
                 state = zlib.decompress(order.state)
                 mapper = self._factory.resume(Snapshot(state, 0, tuple(chapters)))

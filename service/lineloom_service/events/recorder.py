@@ -10,15 +10,18 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from lineloom import wire
 from lineloom_core.mapping.answers.site_view import SiteView
 
-from lineloom_service.events.codec import Told, encode, pack
+from lineloom_service.engine.protocol import Remade
+from lineloom_service.events.codec import encode, pack
 from lineloom_service.events.difference import events_between
 from lineloom_service.events.hub import EventHub
+from lineloom_service.events.remade import as_file, remade_event
 from lineloom_service.store.actions import append_events
+from lineloom_service.store.files import put_file
 from lineloom_service.store.protocol import Store
 from lineloom_service.store.reads import read_last_events
 from lineloom_service.store.records import EventBatch, StoreError
@@ -30,12 +33,17 @@ _SETTLE_S = 5.0
 
 @dataclass(frozen=True, slots=True)
 class _Publication:
-    """A view that is to be told about. reset: why listeners must load anew instead."""
+    """A view that is to be told about. making: what it was made with.
+
+    reset: why listeners must load anew instead. remade: why the map is another one.
+    """
 
     position: int
     view: SiteView
+    making: str
     at: float
     reset: str | None = None
+    remade: str | None = None
 
 
 @dataclass(slots=True)
@@ -54,40 +62,61 @@ class _History:
 class EventRecorder:
     """Keeps the history of every site that this service maps. kept: batches a site."""
 
-    def __init__(self, store: Store, hub: EventHub, producer: str, kept: int) -> None:
+    def __init__(self, store: Store, hub: EventHub, kept: int) -> None:
         self._store = store
         self._hub = hub
-        self._producer = producer
         self._kept = kept
         self._histories: dict[int, _History] = {}
 
+    async def told_of(self, site_id: int) -> str | None:
+        """Return what the map was made with that was told of last, None where nothing was told."""
+        history = await self._history(site_id)
+        return history.producer if history.number else None
+
     async def recorded_position(self, site_id: int) -> int:
         """Return the log position that a site's events go up to. Asked before it is mapped."""
+        return (await self._history(site_id)).position
+
+    async def _history(self, site_id: int) -> _History:
         history = self._histories.get(site_id)
         if history is None:
             last = await self._store.read(read_last_events, site_id)
             history = (
-                _History(0, 0, 0, self._producer)
+                _History(0, 0, 0, "")
                 if last is None
                 else _History(last.number, last.position, last.version, last.producer)
             )
             self._histories[site_id] = history
-        return history.position
+        return history
 
-    def on_view(self, site_id: int, position: int, view: SiteView) -> None:
+    def on_view(self, site_id: int, position: int, view: SiteView, making: str) -> None:
         """Take a published view. Where views come faster than they are told, some are skipped."""
         history = self._histories.get(site_id)
         if history is None or (history.told is None and position < history.position):
             return
-        publication = _Publication(position, view, time.time())
+        publication = _Publication(position, view, making, time.time())
         if history.told is None:
-            reset = _why_reset(history, position, view, self._producer)
+            reset = _why_reset(history, position, view, making)
             history.told = view
             if reset is None:
                 return
-            publication = _Publication(position, view, time.time(), reset)
-        elif history.waiting is not None and history.waiting.reset is not None:
-            publication = _Publication(position, view, time.time(), history.waiting.reset)
+            publication = replace(publication, reset=reset)
+        elif (waiting := history.waiting) is not None:
+            publication = replace(publication, reset=waiting.reset, remade=waiting.remade)
+        self._tell(site_id, history, publication)
+
+    def on_remade(self, site_id: int, made: Remade) -> None:
+        """Take the first view of a map that takes another's place: what differs is told."""
+        history = self._histories.get(site_id)
+        if history is None:
+            return
+        history.told = history.told or made.before
+        publication = _Publication(
+            made.position, made.view, made.making, time.time(), "the map was made anew", made.why
+        )
+        self._tell(site_id, history, publication)
+
+    def _tell(self, site_id: int, history: _History, publication: _Publication) -> None:
         history.waiting = publication
         if history.task is None or history.task.done():
             history.task = asyncio.create_task(self._record(site_id, history))
@@ -120,15 +149,19 @@ class EventRecorder:
     async def _record(self, site_id: int, history: _History) -> None:
         while (publication := history.waiting) is not None and history.told is not None:
             history.waiting = None
-            told, body = await asyncio.to_thread(_tell, history.told, publication)
+            events = await asyncio.to_thread(_events, history.told, publication)
+            told = encode(events)
             batch = EventBatch(
                 history.number + 1,
                 publication.position,
                 publication.view.version,
-                self._producer,
-                body,
+                publication.making,
+                pack(told),
             )
             try:
+                for event in events:
+                    if isinstance(event, wire.RemadeEvent):
+                        await self._store.write(put_file, site_id, "remade", as_file(event))
                 if told:
                     await self._store.write_as_engine(append_events, site_id, batch, self._kept)
             except StoreError:
@@ -143,21 +176,20 @@ class EventRecorder:
                 self._hub.add(site_id, batch.number, told)
 
 
-def _why_reset(history: _History, position: int, view: SiteView, producer: str) -> str | None:
+def _why_reset(history: _History, position: int, view: SiteView, making: str) -> str | None:
     """Tell why the history cannot go on from this view, None where it can."""
-    if history.producer != producer:
+    if history.number and history.producer != making:
         return "another version of the service has made the map anew"
     if position != history.position or view.version != history.version:
         return "the map was made anew, and not all that happened meanwhile was recorded"
     return None
 
 
-def _tell(before: SiteView, publication: _Publication) -> tuple[tuple[Told, ...], bytes]:
-    events: list[wire.AnyEvent]
-    if publication.reset is not None:
-        version, at = publication.view.version, publication.at
-        events = [wire.ResetEvent(version=version, at=at, reason=publication.reset)]
-    else:
-        events = events_between(before, publication.view, publication.at)
-    told = encode(events)
-    return told, pack(told)
+def _events(before: SiteView, publication: _Publication) -> list[wire.AnyEvent]:
+    view, at = publication.view, publication.at
+    if publication.reset is None:
+        return events_between(before, view, at)
+    reset = wire.ResetEvent(version=view.version, at=at, reason=publication.reset)
+    if publication.remade is None:
+        return [reset]
+    return [remade_event(before, view, publication.remade, at), reset]

@@ -21,12 +21,14 @@ _HTTP_BOUNDS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 
 
 @dataclass(frozen=True, slots=True)
 class SiteFigures:
-    """A site now. pending: log entries not yet in the published map."""
+    """A site now. pending: log entries not yet in the published map. remaking: not yet in the
+    one that is made to be shown instead."""
 
     name: str
     pending: int
     held: int
     view: SiteView
+    remaking: int = 0
 
 
 class Metrics:
@@ -147,6 +149,11 @@ def _site_gauges(sites: Sequence[SiteFigures]) -> Iterator[GaugeMetricFamily]:
     figures: list[tuple[str, str, Callable[[SiteFigures], float]]] = [
         ("backlog_entries", "Log entries not yet in the published map.", lambda s: s.pending),
         ("held_scans", "Scans that wait for those before them.", lambda s: s.held),
+        (
+            "remaking_entries",
+            "Log entries not yet in the map that is made anew; 0 where none is.",
+            lambda s: s.remaking,
+        ),
         ("version", "Version of the published map.", lambda s: s.view.version),
         ("components", "Components.", lambda s: len(s.view.components)),
         ("keyframes", "Keyframes.", lambda s: len(s.view.keyframes)),

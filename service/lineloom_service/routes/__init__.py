@@ -4,6 +4,7 @@ from fastapi import APIRouter
 from fastapi.routing import APIRoute
 
 from lineloom_service.routes import (
+    config,
     constraints,
     docs,
     events,
@@ -26,6 +27,7 @@ from lineloom_service.routes import (
 ROUTERS: tuple[APIRouter, ...] = (
     ingest.router,
     sites.router,
+    config.router,
     robots.router,
     trajectory.router,
     transforms.router,

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Response
 from lineloom import wire
 
 from lineloom_service.answers import answer
-from lineloom_service.convert import to_site
+from lineloom_service.convert import to_remaking, to_site
 from lineloom_service.dependencies import KnownSite, ServiceDep
 from lineloom_service.service import Service
 from lineloom_service.store import actions
@@ -44,4 +44,9 @@ async def delete_site(site: KnownSite, service: ServiceDep) -> Response:
 
 def _site(record: SiteRecord, service: Service) -> wire.Site:
     conductor = service.conductor
-    return to_site(record, conductor.published(record.id), conductor.trouble(record.id))
+    return to_site(
+        record,
+        conductor.published(record.id),
+        conductor.trouble(record.id),
+        to_remaking(conductor.remaking(record.id)),
+    )

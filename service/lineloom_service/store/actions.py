@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from sqlalchemy import Connection, delete, func, insert, select, update
 
 from lineloom_service.store import tables
+from lineloom_service.store.config_entry import ConfigEntry
 from lineloom_service.store.database import notify
 from lineloom_service.store.ledger import SiteLedger
 from lineloom_service.store.questions import drop_questions
@@ -137,6 +138,27 @@ def act(
         return None
     tx.add_control(site, robot, kind, constraint.encode())
     return site.position
+
+
+def configure(
+    tx: Transaction, site_name: str, config: ConfigEntry, *, make: bool = False
+) -> ConfigEntry | None:
+    """Log what a site's map is made with, from its first scan on; return the entry in force.
+
+    The same again is not logged. None where there is no such site and `make` is false.
+    """
+    site = tx.site(site_name) if make else tx.ledger.sites.get(site_name)
+    if site is None:
+        return None
+    now = site.config
+    if now is not None and (now.digest, now.own) == (config.digest, config.own):
+        return now
+    return tx.add_config(site, config)
+
+
+def begin_sites_with(tx: Transaction, config: ConfigEntry | None) -> None:
+    """Let the log of every site that this process makes from now on begin with this."""
+    tx.ledger.first_config = config
 
 
 def delete_site(tx: Transaction, site_name: str) -> int | None:

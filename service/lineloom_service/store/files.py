@@ -1,4 +1,4 @@
-"""Files that belong to a site: exports that never change, and its floor plan."""
+"""Files that belong to a site: exports that never change, its floor plan, how it was remade."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sqlalchemy import Connection, delete, insert, select
 from lineloom_service.store import tables
 from lineloom_service.store.transaction import Transaction
 
-FileKind = Literal["export", "floorplan"]
+FileKind = Literal["export", "floorplan", "remade"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from sqlalchemy import Connection, Select, select
 
 from lineloom_service.store import tables
+from lineloom_service.store.config_entry import OWN_ROBOT, ConfigEntry
 from lineloom_service.store.records import RobotRecord, SiteRecord
 from lineloom_service.store.sequencer import Sequencer, Stream
 
@@ -35,7 +36,8 @@ class SiteLedger:
     """A site: `position` is that of the entry released last.
 
     accepted: scans ever taken, those of robots since forgotten included: they stay in the log.
-    held: those of them that wait. changed: robots whose record is out of date.
+    held: those of them that wait. config: what its map is made with; own: the robot that such
+    entries belong to. changed: robots whose record is out of date.
     """
 
     id: int
@@ -44,6 +46,8 @@ class SiteLedger:
     accepted: int = 0
     held: int = 0
     robots: dict[str, RobotLedger] = field(default_factory=dict)
+    config: ConfigEntry | None = None
+    own: RobotLedger | None = None
     changed: set[str] = field(default_factory=set)
     _records: dict[str, RobotRecord] = field(default_factory=dict)
 
@@ -64,6 +68,7 @@ class SiteLedger:
             held=self.held,
             accepted=self.accepted,
             robots=self._records,
+            config=self.config,
             deleted=deleted,
         )
 
@@ -73,7 +78,7 @@ class Ledger:
     """All sites by name, and the id that the next log entry gets.
 
     revision: the clock's that this is the truth of. waiting: the robots that hold scans back, by
-    id.
+    id. first_config: what a new site's log begins with, if with anything.
     """
 
     window_s: float
@@ -82,6 +87,7 @@ class Ledger:
     next_entry: int = 1
     revision: int = -1
     waiting: dict[int, tuple[SiteLedger, RobotLedger]] = field(default_factory=dict)
+    first_config: ConfigEntry | None = None
 
     def add(self, site: SiteLedger) -> None:
         """Take a site in."""
@@ -151,7 +157,10 @@ def _read_robots(
         site = by_id[row.site_id]
         order = Sequencer(ledger.window_s, ledger.max_held, streams.get(row.id, ()))
         site.accepted += order.accepted
-        if not row.forgotten:
+        if row.name == OWN_ROBOT:
+            site.own = RobotLedger(row.id, row.name, order)
+            site.config = None if row.mount is None else ConfigEntry.decode(row.mount)
+        elif not row.forgotten:
             site.held += order.held
             site.robots[row.name] = RobotLedger(row.id, row.name, order, row.mount)
             site.changed.add(row.name)

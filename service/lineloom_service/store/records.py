@@ -7,7 +7,9 @@ from typing import Literal
 
 from lineloom_core.codec import storable
 
-EntryKind = Literal["scan", "mount", "forget", "retract", "restore"]
+from lineloom_service.store.config_entry import ConfigEntry
+
+EntryKind = Literal["scan", "mount", "forget", "retract", "restore", "config"]
 ActionKind = Literal["retract", "restore"]
 """What an operator can do to a constraint; the entry's body is its id."""
 
@@ -49,7 +51,8 @@ class SiteRecord:
 
     id: never used again, also when a deleted site's name is. position: entries released to the
     mapper so far, 1..position without holes. held: scans accepted, but not yet released.
-    deleted: it is gone, and nothing else here means anything.
+    config: what its map is made with, None for the defaults. deleted: it is gone, and nothing else
+    here means anything.
     """
 
     id: int
@@ -58,6 +61,7 @@ class SiteRecord:
     held: int
     accepted: int
     robots: dict[str, RobotRecord] = field(default_factory=dict)
+    config: ConfigEntry | None = None
     deleted: bool = False
 
 

@@ -24,10 +24,13 @@ _PURGE_PORTION = 20
 def save_snapshot(tx: Transaction, site_id: int, snapshot: SnapshotRecord) -> None:
     """Keep a snapshot with its new chapters, and the last one before it.
 
-    Those of other producers stay until this one is as far. Nothing is kept of a site that is gone.
+    Those of other producers stay until the one that the log orders is as far. Nothing is kept of a
+    site that is gone.
     """
-    if all(site.id != site_id for site in tx.ledger.sites.values()):
+    site = next((site for site in tx.ledger.sites.values() if site.id == site_id), None)
+    if site is None:
         return
+    is_last = site.config is None or site.config.making == snapshot.producer
     connection = tx.connection
     c = tables.snapshots.c
     connection.execute(
@@ -48,7 +51,9 @@ def save_snapshot(tx: Transaction, site_id: int, snapshot: SnapshotRecord) -> No
     kept = (
         select(c.position).where(c.site_id == site_id, own).order_by(c.position.desc()).limit(_KEPT)
     )
-    outdated = or_(and_(own, c.position.not_in(kept)), and_(~own, c.position < snapshot.position))
+    outdated = and_(own, c.position.not_in(kept))
+    if is_last:
+        outdated = or_(outdated, and_(~own, c.position < snapshot.position))
     connection.execute(delete(tables.snapshots).where(c.site_id == site_id, outdated))
     _prune_chapters(connection, site_id)
 

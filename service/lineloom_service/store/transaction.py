@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 from sqlalchemy import Connection, bindparam, func, insert, select, update
 
 from lineloom_service.store import tables
+from lineloom_service.store.config_entry import OWN_ROBOT, ConfigEntry
 from lineloom_service.store.ledger import Ledger, RobotLedger, SiteLedger
 from lineloom_service.store.records import EntryKind, NewScan
 from lineloom_service.store.sequencer import Sequencer, Stream
@@ -60,6 +62,8 @@ class Transaction:
             site = SiteLedger(self._insert(tables.sites, name=name), name)
             self.ledger.sites[name] = site
             self.touched[site.id] = site
+            if self.ledger.first_config is not None:
+                self.add_config(site, self.ledger.first_config)
         return site
 
     def robot(self, site: SiteLedger, name: str) -> RobotLedger:
@@ -98,6 +102,21 @@ class Transaction:
         """Log an operator's action; it is released at once."""
         entry = self._add_entry(site, robot, kind, stream_id=None, seq=None, body=body)
         self._place(site, [entry])
+
+    def add_config(self, site: SiteLedger, config: ConfigEntry) -> ConfigEntry:
+        """Log what the site's map is made with from now on; it is released at once."""
+        if site.own is None:
+            number = self._insert(tables.robots, site_id=site.id, name=OWN_ROBOT, forgotten=True)
+            order = Sequencer(self.ledger.window_s, self.ledger.max_held)
+            site.own = RobotLedger(number, OWN_ROBOT, order)
+        position, now = site.position + 1, site.config
+        since = now.since if now is not None and now.digest == config.digest else position
+        site.config = replace(config, position=position, since=since)
+        body = site.config.encode()
+        self.add_control(site, site.own, "config", body)
+        own = tables.robots.c.id == site.own.id
+        self.connection.execute(update(tables.robots).where(own).values(mount=body))
+        return site.config
 
     def release_scans(
         self, site: SiteLedger, robot: RobotLedger, *, all_held: bool = False

@@ -38,6 +38,10 @@ Workers = Annotated[
     int | None,
     typer.Option(min=1, max=64, metavar="N", help="Mapping processes; all cores but one."),
 ]
+MapperConfig = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="The mapper's parameters, TOML; those of a site go first."),
+]
 Open = Annotated[
     bool | None,
     typer.Option("--open", help="Listen beyond this machine although there are no tokens."),
@@ -72,6 +76,7 @@ def serve(
     database_url: DatabaseUrl = None,
     engine: Engine = None,
     workers: Workers = None,
+    mapper_config: MapperConfig = None,
     open_: Open = None,
     ssl_certfile: SslCertfile = None,
     ssl_keyfile: SslKeyfile = None,
@@ -106,6 +111,7 @@ def serve(
         "database_url": database_url,
         "engine": engine,
         "workers": workers,
+        "mapper_config": mapper_config,
         "open": open_,
         "ssl_certfile": ssl_certfile,
         "ssl_keyfile": ssl_keyfile,

@@ -73,6 +73,9 @@ def _show_site(site: Site, robots: list[Robot]) -> None:
     )
     if site.trouble is not None:
         out.print(f"not mapped just now: {site.trouble}", markup=False)
+    if (made := site.remaking) is not None:
+        text = f"made anew, beside this map, at entry {made.position} of {made.of}: {made.why}"
+        out.print(text, markup=False)
     for kind, states in sorted(site.constraints.items()):
         counts = ", ".join(f"{count} {state}" for state, count in sorted(states.items()))
         out.print(f"{kind} constraints: {counts}", markup=False)

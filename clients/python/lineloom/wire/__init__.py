@@ -6,6 +6,7 @@ not know, so that an older client understands a newer service.
 """
 
 from lineloom.wire.base import ID_PATTERN, MAX_BATCH, MAX_BEAMS, MAX_BODY_BYTES, Answer, Request
+from lineloom.wire.config import ConfigChange, ParameterValue, SiteConfig
 from lineloom.wire.constraint import Constraint, ConstraintPage, StateChange
 from lineloom.wire.event import (
     AnyEvent,
@@ -14,6 +15,7 @@ from lineloom.wire.event import (
     ConstraintEvent,
     Event,
     MapEvent,
+    RemadeEvent,
     ResetEvent,
     RobotEvent,
     ScanEvent,
@@ -51,7 +53,7 @@ from lineloom.wire.pose import PoseAnswer, UncertainPose
 from lineloom.wire.problem import FieldError, Problem
 from lineloom.wire.robot import MountSettings, Robot, RobotList, RobotSettings
 from lineloom.wire.scan import Odometry, Scan
-from lineloom.wire.site import Component, ScanCounts, Site, SiteList
+from lineloom.wire.site import Component, Remaking, ScanCounts, Site, SiteList
 from lineloom.wire.status import Health, Readiness
 from lineloom.wire.trajectory import Trajectory, TrajectoryPose
 from lineloom.wire.transform import Transform
@@ -73,6 +75,7 @@ __all__ = [
     "ComponentMergedEvent",
     "ComponentRobots",
     "ComponentSplitEvent",
+    "ConfigChange",
     "Constraint",
     "ConstraintDetail",
     "ConstraintEvent",
@@ -109,6 +112,7 @@ __all__ = [
     "MatchedLines",
     "MountSettings",
     "Odometry",
+    "ParameterValue",
     "Placement",
     "PlanDifferences",
     "PlanPiece",
@@ -116,6 +120,8 @@ __all__ = [
     "Problem",
     "Readiness",
     "RejectedScan",
+    "RemadeEvent",
+    "Remaking",
     "Request",
     "ResetEvent",
     "Robot",
@@ -129,6 +135,7 @@ __all__ = [
     "ScanCounts",
     "ScanEvent",
     "Site",
+    "SiteConfig",
     "SiteList",
     "StateChange",
     "Submap",

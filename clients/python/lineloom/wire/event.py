@@ -8,6 +8,7 @@ from pydantic import Field, RootModel
 
 from lineloom.wire.base import Answer
 from lineloom.wire.constraint import ConstraintKind, ConstraintState
+from lineloom.wire.evidence import ComponentRobots, RobotMove
 from lineloom.wire.pose import UncertainPose
 from lineloom.wire.robot import RobotState
 
@@ -110,6 +111,28 @@ class ResetEvent(BaseEvent):
     reason: str
 
 
+class RemadeEvent(BaseEvent):
+    """The map was made anew from the first scan, and is shown instead of the one before.
+
+    why: what the map before was made with was something else. A `reset` follows. Constraints are
+    those that tie robots or close loops: accepted now and not before, and the other way round.
+    complete: false where they are too many to be listed in full. robots: how far the latest pose
+    of each moved; null where that cannot be compared. lines_changed: new or not what they were.
+    """
+
+    type: Literal["remade"] = "remade"
+    why: str
+    version_before: int
+    components_before: list[ComponentRobots]
+    components_after: list[ComponentRobots]
+    constraints_gained: list[str]
+    constraints_lost: list[str]
+    complete: bool = True
+    robots: list[RobotMove]
+    lines_changed: int
+    lines_removed: int
+
+
 AnyEvent = Annotated[
     ScanEvent
     | RobotEvent
@@ -117,6 +140,7 @@ AnyEvent = Annotated[
     | ComponentSplitEvent
     | ConstraintEvent
     | MapEvent
+    | RemadeEvent
     | ResetEvent,
     Field(discriminator="type"),
 ]

@@ -25,6 +25,17 @@ class Component(Answer):
     keyframes: int
 
 
+class Remaking(Answer):
+    """The map is being made anew, beside the one that is shown, up to `position` of `of` entries.
+
+    why: what differs from what the shown one was made with.
+    """
+
+    position: int
+    of: int
+    why: str
+
+
 class Site(Answer):
     """How a site is doing.
 
@@ -32,6 +43,7 @@ class Site(Answer):
     constraints: counts by kind and, within it, by state.
     merged_into: id of an absorbed component -> id of its survivor.
     trouble: why it is not mapped just now, None where all is well.
+    remaking: how far the map is that will be shown instead of this one, None where none is made.
     """
 
     site: str
@@ -43,6 +55,7 @@ class Site(Answer):
     merged_into: dict[str, str]
     constraints: dict[str, dict[str, int]]
     trouble: str | None = None
+    remaking: Remaking | None = None
 
 
 class SiteList(Answer):
