@@ -174,6 +174,23 @@ async def test_scans_are_taken_while_kernels_are_compiled(
 
 
 @pytest.mark.usefixtures("nothing_left")
+async def test_where_nothing_can_be_kept_workers_compile_and_the_log_says_what_to_set(
+    compiler: list[_FakeCompiler],
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    monkeypatch.setattr(compilation, "can_keep", lambda: False)
+    engine = LocalEngine(1, mapper="fake_mapper:FakeMapper", warm_up="a_compiler:warm_up")
+    await engine.start()
+    try:
+        await _until(lambda: not engine.not_ready())
+        assert not compiler[-1].ends.is_set()
+        assert "LINELOOM_KERNEL_CACHE" in caplog.text
+    finally:
+        await engine.stop()
+
+
+@pytest.mark.usefixtures("nothing_left")
 async def test_workers_compile_by_themselves_where_that_fails(
     compiler: list[_FakeCompiler], caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -44,6 +44,19 @@ def writable() -> Path | None:
     return None
 
 
+def can_keep() -> bool:
+    """Return whether what is compiled now is found by the next process; tries it."""
+    place = writable()
+    if place is None:
+        return False
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=place).close()
+    except OSError:
+        return False
+    return True
+
+
 def shipped(package: str) -> Path:
     """Return the folder of machine code that a wheel brings with it; a source tree has none."""
     spec = find_spec(package)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from lineloom_core.fusion.occupancy import rasterise
+from lineloom_core.kernels import folders
 from lineloom_core.kernels.compilations import compilations
 from lineloom_core.mapping.site_mapper import SiteMapper
 from lineloom_core.matching import LineMatcher
@@ -16,12 +17,12 @@ from lineloom_core.scan import Scan
 def warm_up() -> bool:
     """Run a short made-up drive through mapper and matcher; a minute without a cache, else less.
 
-    Returns whether anything had to be compiled: the compiler keeps some 300 MB for as long as its
-    process runs, and another one, that finds all in the cache, does without.
+    Returns whether anything had to be compiled and is kept: the compiler has some 300 MB for as
+    long as its process runs, and another one, that finds all in the cache, does without.
     """
     with compilations() as compiled:
         drive()
-    return bool(compiled)
+    return bool(compiled) and folders.can_keep()
 
 
 def drive() -> None:

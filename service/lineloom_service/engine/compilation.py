@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 
+from lineloom_core.kernels.folders import can_keep
 from lineloom_core.warm_up.compiling import Compiler, Progress, is_compiled
 
 _LOG = logging.getLogger(__name__)
@@ -35,6 +36,12 @@ class Compilation:
     async def until_it_maps(self) -> None:
         """Return when workers find what they need, or when it failed and they must compile."""
         if await asyncio.to_thread(is_compiled):
+            return
+        if not can_keep():
+            _LOG.warning(
+                "compiled kernels cannot be kept: every start compiles them again, for minutes; "
+                "set LINELOOM_KERNEL_CACHE to a folder that can be written"
+            )
             return
         self._on_progress(Progress(0, self._compiler.of, "matching", maps=False))
         threading.Thread(target=self._run, name="lineloom-compile", daemon=True).start()

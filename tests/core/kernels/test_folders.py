@@ -33,6 +33,7 @@ def test_the_setting_goes_before_all_and_need_not_be_writable(
     _block(tmp_path / "barred")
     monkeypatch.setenv(folders.SETTING, str(tmp_path / "barred/x"))
     assert folders.writable() == tmp_path / "barred/x"
+    assert not folders.can_keep()
 
 
 def test_the_first_place_that_can_be_written_is_taken(
@@ -49,6 +50,7 @@ def test_the_first_place_that_can_be_written_is_taken(
     assert found is not None
     assert found.parent == tmp_path / "tmp"
     assert found.stat().st_mode & 0o777 == 0o700
+    assert folders.can_keep()
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="folders belong to nobody here")
@@ -58,6 +60,7 @@ def test_a_folder_that_others_may_write_in_is_not_run_from(tmp_path: Path) -> No
     folder.mkdir()
     folder.chmod(0o777)
     assert folders.writable() is None
+    assert not folders.can_keep()
     folder.rmdir()
     folder.symlink_to(tmp_path)
     folders.writable.cache_clear()

@@ -71,16 +71,9 @@ def _kernels() -> Finding:
     kept = folders.kept("lineloom_core", target)
     if kept:
         return ok("numba", f"{version}, {kept} kernels compiled for {target}")
-    try:
-        if place is None:
-            raise OSError(None, "no folder can be written")
-        place.mkdir(parents=True, exist_ok=True)
-        probe = place / ".lineloom-doctor"
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
+    if not folders.can_keep():
         advice = f"set {folders.SETTING} to a folder that can be written"
-        return noted("numba", f"{place}: {error.strerror}: nothing compiled can be kept", advice)
+        return noted("numba", f"{place or 'nowhere'}: nothing compiled can be kept", advice)
     return ok("numba", f"{version}, nothing compiled yet: the first start takes a minute")
 
 
