@@ -334,7 +334,7 @@ def test_a_kill_meanwhile_loses_neither(tmp_path: Path) -> None:
         with server(tmp_path, port, **SLOW) as process:
             client.wait_until_ready(maps=True)
             assert "made anew" in (client.set_config("s", {"join": {"least_set": 5}}).effect or "")
-            while (client.site("s").remaking or before).position < 60:  # type: ignore[union-attr]
+            while (made := client.site("s").remaking) is None or made.position < 60:
                 time.sleep(0.02)
             process.kill()
             process.wait()
