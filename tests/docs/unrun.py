@@ -26,6 +26,7 @@ UNRUN = (
     Unrun(r"cd |ros2 |colcon ", 4, "no ROS where this is tested"),
     Unrun(r"pip install ", 2, "would fetch the released package in place of this checkout's"),
     Unrun(r"\S+python -m lineloom_lab.evaluation.calibration", 1, "fits for many minutes"),
+    Unrun(r"curl -s \S+/config/difference", 1, "404 here; tests/contract/test_config.py has it"),
     Unrun(r"\S+lineloom bench pairs", 1, "minutes on real pairs; tests/lab/evaluation has it"),
 )
 

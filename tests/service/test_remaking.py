@@ -332,17 +332,17 @@ def test_a_kill_meanwhile_loses_neither(tmp_path: Path) -> None:
             before = client.wait_until_idle("s")
             time.sleep(1.0)  # a snapshot is taken every 100 entries
         with server(tmp_path, port, **SLOW) as process:
-            client.wait_until_ready(maps=True)
+            client.wait_until_idle("s")
             assert "made anew" in (client.set_config("s", {"join": {"least_set": 5}}).effect or "")
             while (made := client.site("s").remaking) is None or made.position < 60:
                 time.sleep(0.02)
             process.kill()
             process.wait()
-        with server(tmp_path, port, **SLOW):
-            client.wait_until_ready(maps=True)
-            between = client.site("s")
-            assert between.remaking is not None, "as before the kill"
-            assert between.version == before.version
+        with server(tmp_path, port, FAKE_MAPPER_SECONDS="0.02"):
+            while (between := client.site("s")).version < before.version:
+                time.sleep(0.02)
+            assert between.version == before.version, "as before the kill"
+            assert between.remaking is not None
             client.post_scans("s", "r", scans[210:])
             while client.site("s").remaking is not None:
                 time.sleep(0.05)
