@@ -15,6 +15,8 @@ from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.matching import _registration_kernels as _kernels
 
 _SECTOR_RAD = math.radians(10.0)
+_SECTOR_SHIFT = 0.037
+"""Beams lie at whole or half degrees: none may lie on a border, where the last bit tells."""
 _LEAST_POINTS = 10  # of half a scan that a registration can be tried with
 _HALF_HOLD = np.diag([25.0, 25.0, 100.0])
 """Information that keeps the covariance of half a scan finite where it observes nothing."""
@@ -51,7 +53,8 @@ class Cloud:
 
         Sectors, not single beams: what lies side by side errs together.
         """
-        sector = np.floor(np.arctan2(self.points[:, 1], self.points[:, 0]) / _SECTOR_RAD)
+        bearing = np.arctan2(self.points[:, 1], self.points[:, 0])
+        sector = np.floor(bearing / _SECTOR_RAD + _SECTOR_SHIFT)
         first = sector % 2 == 0
         return self.only(first), self.only(~first)
 
@@ -88,7 +91,7 @@ class LocalMap:
             _kernels.bounds(cloud.points, pose, reach, box)
         if not np.all(np.isfinite(box)):
             box = np.zeros(4)
-        margin = 3 * _kernels.CELL
+        margin = 3.5 * _kernels.CELL  # the outermost points, too, lie amid their cells
         ox, oy = float(box[0] - margin), float(box[1] - margin)
         nx = math.ceil((box[2] + margin - ox) / _kernels.CELL)
         ny = math.ceil((box[3] + margin - oy) / _kernels.CELL)

@@ -72,7 +72,12 @@ def take(
 
 
 def _in_order(record: RobotRecord, scan: Scan, *, is_late: bool) -> Scan:
-    """Step 1: without the skew of turning, where beams are timed, and counter-clockwise."""
+    """Step 1: without the skew of turning, where beams are timed, and counter-clockwise.
+
+    Ranges count to a micrometre: last bits depend on who computed them, and would tell where a
+    line is split or a point falls.
+    """
+    scan = replace(scan, ranges=np.round(scan.ranges, 6))
     inverted = record.mount.inverted
     if record.tracker is not None and not is_late:
         scan = without_skew(scan, record.tracker.turn_rate, inverted=inverted)

@@ -122,7 +122,7 @@ class Tracker:
             self._wheels.compare(rolled, self._pose.between(found.pose), unseen)
         # Wheels know the way along a plain corridor; elsewhere velocity has less of a bias.
         due = predictions[-1] if not trusted or unseen is not None else predictions[-2]
-        found = self._held(found, due, stamp - self._stamp)
+        found = _without_last_bits(self._held(found, due, stamp - self._stamp))
         checks = {
             "fit": found.fit,
             "conflict_share": self._conflict(features, found.pose),
@@ -259,6 +259,16 @@ class Tracker:
 
 def _nowhere(status: Status, checks: dict[str, float] | None = None) -> Tracked:
     return Tracked(status, None, False, np.zeros((3, 3)), checks or {})
+
+
+def _without_last_bits(found: Registration) -> Registration:
+    """The same, its pose to a micrometre and a tenth of a microradian.
+
+    Processors differ in the last bits, and tracking would amplify that to centimetres within
+    minutes: a point falls into another cell, a scan becomes a keyframe sooner.
+    """
+    x, y, theta = found.pose.x, found.pose.y, found.pose.theta
+    return replace(found, pose=Pose(round(x, 6), round(y, 6), round(theta, 7)))
 
 
 def _unobserved(found: Registration, least: float) -> float | None:
