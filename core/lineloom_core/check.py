@@ -6,10 +6,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from lineloom_core.codec import storable
+
 Figures = Mapping[str, float]
 """What was measured, by the name of its check."""
 
 
+@storable("limit")
 @dataclass(frozen=True, slots=True)
 class Limit:
     """What a figure was held to; both bounds None where it is only shown.

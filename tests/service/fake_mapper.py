@@ -11,7 +11,6 @@ import itertools
 import json
 import math
 import os
-import pickle
 import signal
 import time
 import zlib
@@ -20,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 from lineloom_core.check import Limit
+from lineloom_core.codec import decode, encode
 from lineloom_core.fusion.occupancy import Rays
 from lineloom_core.geometry import Pose
 from lineloom_core.mapping.answers.evidence import (
@@ -187,17 +187,17 @@ class FakeMapper:
 
     def snapshot(self, known: int = 0) -> Snapshot:
         if self._latest == UNSAVED:
-            raise ValueError("this cannot be pickled")
+            raise ValueError("this cannot be saved")
         end = len(self._history) // SEALED
         state = {**self.__dict__, "_history": self._history[end * SEALED :], "chapters": end}
         del state["_scans"]
         chapters = tuple(self._chapter(number) for number in range(known, end))
-        return Snapshot(pickle.dumps(state), known, chapters)
+        return Snapshot(encode(state), known, chapters)
 
     @classmethod
     def resume(cls, snapshot: Snapshot) -> FakeMapper:
         mapper = cls()
-        state = pickle.loads(snapshot.state)
+        state = decode(snapshot.state, dict)
         if (snapshot.first, snapshot.end) != (0, state.pop("chapters")):
             raise ValueError(f"these are not its chapters: {snapshot.first} to {snapshot.end}")
         sealed = [row for chapter in snapshot.chapters for row in _unsealed(chapter)]

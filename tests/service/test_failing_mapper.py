@@ -92,7 +92,7 @@ async def test_a_map_that_cannot_be_saved_is_told_and_costs_no_scan(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(site_runner, "_SAVE_AGAIN_S", 0.05)
-    said = "its map is not saved beyond entry 0: ValueError: this cannot be pickled"
+    said = "its map is not saved beyond entry 0: ValueError: this cannot be saved"
     async with _mapping(tmp_path) as (store, conductor):
         await _post(store, 0, UNSAVED)
         await _until(lambda: conductor.trouble(SITE) == said)

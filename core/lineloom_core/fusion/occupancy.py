@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lineloom_core.codec import storable
 from lineloom_core.fusion import _occupancy_kernels as _kernels
 from lineloom_core.geometry import Pose
 
@@ -27,6 +28,7 @@ class GridTooLargeError(ValueError):
     """The map would take more cells than anybody can use; the text says what would do."""
 
 
+@storable("rays")
 @dataclass(frozen=True, eq=False)
 class Rays:
     """Scans as rays: k lasers, n beams in all.

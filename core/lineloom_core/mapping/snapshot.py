@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from lineloom_core.codec import storable
+
 
 class SnapshotError(ValueError):
     """A snapshot that this version cannot read: rebuild from the log instead."""
 
 
+@storable("snapshot")
 @dataclass(frozen=True, slots=True)
 class Snapshot:
     """State, and chapters of the history that it goes on from.

@@ -5,12 +5,14 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import pickle
 import uuid
 from collections.abc import Awaitable, Callable
-from typing import Any
+from typing import Any, Literal
+
+from lineloom_core.codec import CodecError, decode, encode
 
 from lineloom_service.engine.protocol import QuestionFailedError, WorkerDiedError
+from lineloom_service.engine.questions import pack_question, unpack_answer, unpack_question
 from lineloom_service.store.protocol import Store
 from lineloom_service.store.questions import post_answer, post_question, read_question, take_answer
 from lineloom_service.store.records import StoreError
@@ -20,6 +22,9 @@ _LOG = logging.getLogger(__name__)
 _PATIENCE_S = 30.0
 _LOOK_S = 2.0
 """How often an answer is looked for although no notice came: notices may be lost."""
+
+
+_Outcome = Literal["answered", "failed", "died"]
 
 
 class Forwarding:
@@ -36,7 +41,7 @@ class Forwarding:
         key = uuid.uuid4().hex
         news = self._waiting[key] = asyncio.Event()
         try:
-            asked = pickle.dumps((site_id, question, arguments))
+            asked = pack_question(site_id, question, arguments)
             await self._store.write_apart(post_question, key, asked)
             async with asyncio.timeout(_PATIENCE_S):
                 answer = await self._await_answer(key, news)
@@ -44,12 +49,7 @@ class Forwarding:
             raise WorkerDiedError(None, "no engine has answered", killed=False) from error
         finally:
             del self._waiting[key]
-        outcome, value = pickle.loads(answer)
-        if outcome == "failed":
-            raise QuestionFailedError(value)
-        if outcome == "died":
-            raise WorkerDiedError(None, value, killed=False)
-        return value
+        return await asyncio.to_thread(_read, question, answer)
 
     def on_answer(self, key: str) -> None:
         """There is an answer, perhaps to a question of this process."""
@@ -79,17 +79,35 @@ class Forwarding:
             question = await self._store.read(read_question, key)
             if question is None:
                 return
-            answer = await self._answered(*pickle.loads(question))
-            await self._store.write_apart(post_answer, key, pickle.dumps(answer))
+            answer = await self._answered(question)
+            await self._store.write_apart(post_answer, key, encode(answer))
         except StoreError:
             _LOG.exception("a forwarded question is not answered")
 
-    async def _answered(
-        self, site_id: int, question: str, arguments: tuple[object, ...]
-    ) -> tuple[str, Any]:
+    async def _answered(self, data: bytes) -> tuple[_Outcome, bytes]:
         try:
-            return "answered", await self._answer(site_id, question, *arguments)
+            site_id, question, arguments = await asyncio.to_thread(unpack_question, data)
+            answer = await self._answer(site_id, question, *arguments)
+            return "answered", await asyncio.to_thread(encode, answer)
         except WorkerDiedError as error:
-            return "died", error.reason
+            return "died", error.reason.encode()
         except QuestionFailedError as error:
-            return "failed", str(error)
+            return "failed", str(error).encode()
+        except CodecError as error:
+            _LOG.warning("a forwarded question is unreadable: %s", error)
+            return "failed", f"unreadable question: {error}".encode()
+
+
+def _read(question: str, data: bytes) -> Any:
+    """The answer to a question; raises what became of it instead."""
+    try:
+        outcome, value = decode(data, tuple[_Outcome, bytes])
+        if outcome == "answered":
+            return unpack_answer(question, value)
+    except CodecError as error:
+        _LOG.warning("the answer to a forwarded question is unreadable: %s", error)
+        raise QuestionFailedError(f"unreadable answer: {error}") from error
+    reason = value.decode(errors="replace")
+    if outcome == "failed":
+        raise QuestionFailedError(reason)
+    raise WorkerDiedError(None, reason, killed=False)

@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator, Awaitable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from lineloom_core.codec import CodecError, encode
 from lineloom_core.mapping.snapshot import Snapshot
 
 from lineloom_service.engine.compilation import Compilation
@@ -42,6 +43,7 @@ from lineloom_service.engine.protocol import (
     ViewListener,
     WorkerDiedError,
 )
+from lineloom_service.engine.questions import unpack_answer
 from lineloom_service.engine.worker_process import WorkerProcess
 from lineloom_service.observation.durations import Durations
 from lineloom_service.store.records import LogEntry
@@ -231,7 +233,8 @@ class LocalEngine:
             raise WorkerDiedError(None, "the site is not hosted yet", killed=False)
         if hosted.gathering:
             raise WorkerDiedError(None, "the site is being resumed", killed=False)
-        return self._ask(hosted, Ask(site, hosted.run, question, arguments))
+        order = Ask(site, hosted.run, question, encode(arguments))
+        return _answer(question, self._ask(hosted, order))
 
     def stop_site(self, site: int) -> None:
         """Host a site no longer."""
@@ -330,6 +333,15 @@ class LocalEngine:
             site.fail(WorkerDiedError(position, slot.last_words, killed=process.killed))
         pause = min(_RESPAWN_LIMIT_S, _RESPAWN_S * 2**slot.stillborn) if slot.stillborn else 0.0
         asyncio.get_running_loop().call_later(pause, self._spawn, slot)
+
+
+async def _answer(question: str, answered: Awaitable[bytes]) -> Any:
+    """The answer to a question, read on a thread: it may be large."""
+    data = await answered
+    try:
+        return await asyncio.to_thread(unpack_answer, question, data)
+    except CodecError as error:
+        raise QuestionFailedError(f"unreadable answer: {error}") from error
 
 
 def _resolve(

@@ -17,9 +17,6 @@ from lineloom_service.store.records import LogEntry
 SITE_MAPPER = "lineloom_core.mapping.site_mapper:SiteMapper"
 """Where the mapper is; by name, so that the API process need not import gtsam."""
 
-QUESTIONS = frozenset({"what_if", "explain", "localise", "rays"})
-"""Methods of the mapper that answer and change nothing: what `Engine.ask` may name."""
-
 WARM_UP = "lineloom_core.warm_up.drive:warm_up"
 """What a worker calls before it is ready: loads its kernels, and compiles what is missing."""
 

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from lineloom_core.codec import storable
 from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_core.mapping.snapshot import Snapshot
 
@@ -18,6 +19,7 @@ from lineloom_service.observation.durations import Durations
 from lineloom_service.store.records import LogEntry
 
 
+@storable("message-chapter")
 @dataclass(frozen=True, slots=True)
 class Chapter:
     """Keep this for the start of the site that comes next. Chapters come in order."""
@@ -27,6 +29,7 @@ class Chapter:
     data: bytes
 
 
+@storable("message-start-site")
 @dataclass(frozen=True, slots=True)
 class StartSite:
     """Host a site. state: of a snapshot that goes on from the chapters that came before.
@@ -41,6 +44,7 @@ class StartSite:
     parameters: Mapping[str, Any]
 
 
+@storable("message-feed")
 @dataclass(frozen=True, slots=True)
 class Feed:
     """Map these entries; afterwards the site is at `through`. publish: show the map right then."""
@@ -53,6 +57,7 @@ class Feed:
     publish: bool = False
 
 
+@storable("message-take-snapshot")
 @dataclass(frozen=True, slots=True)
 class TakeSnapshot:
     """Answer with the mapper's state, without the first `known` chapters of its history."""
@@ -62,16 +67,21 @@ class TakeSnapshot:
     known: int
 
 
+@storable("message-ask")
 @dataclass(frozen=True, slots=True)
 class Ask:
-    """Answer a question about the map; nothing changes. question: a method of the mapper."""
+    """Answer a question about the map; nothing changes. question: a method of the mapper.
+
+    arguments: as `questions` writes them.
+    """
 
     site: int
     run: int
     question: str
-    arguments: tuple[object, ...]
+    arguments: bytes
 
 
+@storable("message-stop-site")
 @dataclass(frozen=True, slots=True)
 class StopSite:
     """Host a site no longer."""
@@ -82,11 +92,13 @@ class StopSite:
 Order = Chapter | StartSite | Feed | TakeSnapshot | Ask | StopSite
 
 
+@storable("message-ready")
 @dataclass(frozen=True, slots=True)
 class Ready:
     """The worker is warm."""
 
 
+@storable("message-chapter-taken")
 @dataclass(frozen=True, slots=True)
 class ChapterTaken:
     """A chapter has arrived."""
@@ -95,6 +107,7 @@ class ChapterTaken:
     run: int
 
 
+@storable("message-started")
 @dataclass(frozen=True, slots=True)
 class Started:
     """The site is hosted. failure: why not."""
@@ -104,6 +117,7 @@ class Started:
     failure: str | None = None
 
 
+@storable("message-fed")
 @dataclass(frozen=True, slots=True)
 class Fed:
     """A feed is mapped."""
@@ -122,6 +136,7 @@ class View:
     view: SiteView
 
 
+@storable("message-encoded-view")
 @dataclass(frozen=True, slots=True)
 class EncodedView:
     """A `View` as it travels."""
@@ -132,6 +147,7 @@ class EncodedView:
     parts: Parts
 
 
+@storable("message-view-failed")
 @dataclass(frozen=True, slots=True)
 class ViewFailed:
     """The mapper could not show the site as it is after the entry at `position`."""
@@ -142,6 +158,7 @@ class ViewFailed:
     reason: str
 
 
+@storable("message-stopped")
 @dataclass(frozen=True, slots=True)
 class Stopped:
     """The site is hosted no longer: nothing more comes of it."""
@@ -149,6 +166,7 @@ class Stopped:
     site: int
 
 
+@storable("message-snapshot-taken")
 @dataclass(frozen=True, slots=True)
 class SnapshotTaken:
     """The snapshot after all that was fed, its state compressed. failure: why there is none."""
@@ -159,16 +177,18 @@ class SnapshotTaken:
     failure: str | None = None
 
 
+@storable("message-answered")
 @dataclass(frozen=True, slots=True)
 class Answered:
-    """The answer to a question. failure: why there is none."""
+    """The answer to a question, as `questions` writes it. failure: why there is none."""
 
     site: int
     run: int
-    value: object = None
+    value: bytes = b""
     failure: str | None = None
 
 
+@storable("message-failed")
 @dataclass(frozen=True, slots=True)
 class Failed:
     """The mapper raised; the worker has dropped the site."""
@@ -179,6 +199,7 @@ class Failed:
     reason: str
 
 
+@storable("message-timed")
 @dataclass(frozen=True, slots=True)
 class Timed:
     """How long the worker's stages took since it last said so."""

@@ -141,7 +141,7 @@ class Engine(Protocol):
         ...
 
     def ask(self, site: int, question: str, *arguments: object) -> Awaitable[Any]:
-        """Ask the site's mapper something that changes nothing (`mapper.QUESTIONS`).
+        """Ask the site's mapper something that changes nothing (`questions`).
 
         Answered after all that was fed before. Raises QuestionFailedError.
         """

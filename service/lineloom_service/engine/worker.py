@@ -12,14 +12,16 @@ import time
 import zlib
 from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
+from typing import Any
 
 from lineloom_core import timing
+from lineloom_core.codec import decode, encode, inflate
 from lineloom_core.mapping.config import config_from
 from lineloom_core.mapping.snapshot import Snapshot
 
 from lineloom_service.allocator import trim
 from lineloom_service.engine.current_entry import BUSY, RESTORING, CurrentEntry
-from lineloom_service.engine.mapper import QUESTIONS, Mapper, MapperFactory, apply, load
+from lineloom_service.engine.mapper import Mapper, MapperFactory, apply, load
 from lineloom_service.engine.messages import (
     Answered,
     Ask,
@@ -41,6 +43,7 @@ from lineloom_service.engine.messages import (
     Timed,
     ViewFailed,
 )
+from lineloom_service.engine.questions import unpack_arguments
 from lineloom_service.engine.turns import Turns
 from lineloom_service.engine.view_parts import ViewEncoder
 from lineloom_service.observation.durations import Durations
@@ -89,7 +92,7 @@ class Worker:
 
     def __init__(
         self,
-        connection: Connection[Sent, Order],
+        connection: Connection[Any, Any],
         current: CurrentEntry,
         factory: MapperFactory,
         publish_every_s: float,
@@ -106,16 +109,19 @@ class Worker:
 
     def serve(self) -> None:
         """Work through orders entry by entry, sites in turn, and publish what is due between."""
-        self._connection.send(Ready())
+        self._send(Ready())
         while True:
             while self._connection.poll(self._pause()):
                 try:
-                    self._turns.put(self._connection.recv())
+                    self._turns.put(decode(self._connection.recv_bytes(), Order))
                 except EOFError:
                     return
             if self._turns:
                 self._take_turn()
             self._publish_due()
+
+    def _send(self, message: Sent) -> None:
+        self._connection.send_bytes(encode(message))
 
     def _take_turn(self) -> None:
         order = self._turns.next()
@@ -147,7 +153,7 @@ class Worker:
         elif isinstance(order, StopSite):
             self._sites.pop(order.site, None)
             self._gathered.pop(order.site, None)
-            self._connection.send(Stopped(order.site))
+            self._send(Stopped(order.site))
         return True
 
     def _gather(self, order: Chapter) -> None:
@@ -156,7 +162,7 @@ class Worker:
         if gathered is None or gathered.run != order.run:
             gathered = self._gathered[order.site] = _Gathered(order.run)
         gathered.chapters.append(order.data)
-        self._connection.send(ChapterTaken(order.site, order.run))
+        self._send(ChapterTaken(order.site, order.run))
 
     def _start(self, order: StartSite) -> None:
         self._sites.pop(order.site, None)
@@ -167,16 +173,16 @@ class Worker:
             if order.state is None:
                 mapper = self._factory(config_from(order.parameters))
             else:
-                state = zlib.decompress(order.state)
+                state = inflate(order.state)
                 mapper = self._factory.resume(Snapshot(state, 0, tuple(chapters)))
         except Exception as error:
-            self._connection.send(Started(order.site, order.run, describe(error)))
+            self._send(Started(order.site, order.run, describe(error)))
             return
         finally:
             self._current.clear()
         now = time.monotonic()
         self._sites[order.site] = _Hosted(order.run, mapper, order.position, due=now)
-        self._connection.send(Started(order.site, order.run))
+        self._send(Started(order.site, order.run))
 
     def _feed(self, order: Feed) -> bool:
         hosted = self._hosted(order)
@@ -194,7 +200,7 @@ class Worker:
         hosted.due = hosted.earliest + max(pause, hosted.pause)
         if order.publish:
             self._publish(order.site, hosted)
-        self._connection.send(Fed(order.site, order.run))
+        self._send(Fed(order.site, order.run))
         return True
 
     def _apply(self, hosted: _Hosted, order: Feed, entry: LogEntry) -> bool:
@@ -206,7 +212,7 @@ class Worker:
             # Half of the entry may have been taken: this mapper is not to be used again.
             del self._sites[order.site]
             reason = describe(error)
-            self._connection.send(Failed(order.site, order.run, entry.position, reason))
+            self._send(Failed(order.site, order.run, entry.position, reason))
             return False
         finally:
             self._current.clear()
@@ -227,11 +233,11 @@ class Worker:
         except Exception as error:
             # The map is as it was, and no entry is to blame: the site goes on without.
             _LOG.exception("site %d: no snapshot", order.site)
-            self._connection.send(SnapshotTaken(order.site, order.run, failure=describe(error)))
+            self._send(SnapshotTaken(order.site, order.run, failure=describe(error)))
             return
         finally:
             self._current.clear()
-        self._connection.send(SnapshotTaken(order.site, order.run, snapshot))
+        self._send(SnapshotTaken(order.site, order.run, snapshot))
         trim()
 
     def _answer(self, order: Ask) -> None:
@@ -240,17 +246,16 @@ class Worker:
             return
         self._current.mark(order.site, BUSY)
         try:
-            if order.question not in QUESTIONS:
-                raise ValueError(f"no question {order.question!r}")
-            value = getattr(hosted.mapper, order.question)(*order.arguments)
+            arguments = unpack_arguments(order.question, order.arguments)
+            value = encode(getattr(hosted.mapper, order.question)(*arguments))
         except Exception as error:
             # The map is as it was: the question is to blame, not the mapper.
             _LOG.exception("site %d: %s was not answered", order.site, order.question)
-            self._connection.send(Answered(order.site, order.run, failure=describe(error)))
+            self._send(Answered(order.site, order.run, failure=describe(error)))
             return
         finally:
             self._current.clear()
-        self._connection.send(Answered(order.site, order.run, value))
+        self._send(Answered(order.site, order.run, value))
 
     def _hosted(self, order: Feed | TakeSnapshot | Ask) -> _Hosted | None:
         """Return the site's mapper, unless the order is meant for one that has failed since."""
@@ -274,11 +279,11 @@ class Worker:
             # The site stays at its last view, and is not idle: that is the truth.
             _LOG.exception("site %d: no view after entry %d", site, hosted.position)
             failed = ViewFailed(site, hosted.run, hosted.position, describe(error))
-            self._connection.send(failed)
+            self._send(failed)
         else:
             self._durations.observe("view", time.monotonic() - started)
-            self._connection.send(Timed(self._durations.take()))
-            self._connection.send(EncodedView(site, hosted.run, hosted.position, parts))
+            self._send(Timed(self._durations.take()))
+            self._send(EncodedView(site, hosted.run, hosted.position, parts))
         self._current.clear()
         hosted.earliest = time.monotonic()
         hosted.pause = (hosted.earliest - started) / _PUBLISHING_SHARE
@@ -309,7 +314,7 @@ def run_worker(
     factory = load(mapper)
     if warm_up is not None and load(warm_up)():
         _begin_again()
-    connection: Connection[Sent, Order] = Connection(pipe)
+    connection: Connection[Any, Any] = Connection(pipe)
     # The service has closed its end: nobody is left to report to.
     with contextlib.suppress(BrokenPipeError, ConnectionResetError):
         Worker(connection, CurrentEntry(current), factory, publish_every_s).serve()

@@ -12,6 +12,9 @@ import sys
 import threading
 from collections.abc import Callable
 from multiprocessing.connection import Connection, Pipe
+from typing import Any
+
+from lineloom_core.codec import CodecError, decode, encode
 
 from lineloom_service.engine.current_entry import CurrentEntry
 from lineloom_service.engine.messages import (
@@ -31,7 +34,8 @@ class WorkerProcess:
 
     A program of its own and not `multiprocessing`'s: that would run the main script again in the
     child, which starts another service where the script has no guard. Threads, because a full
-    pipe must not stop the event loop, and unpickling a large map neither.
+    pipe must not stop the event loop, and reading a large map neither. What the child sends is
+    data: a child that sends anything else is ended.
     """
 
     def __init__(
@@ -51,10 +55,11 @@ class WorkerProcess:
         self._current = CurrentEntry.create()
         self._blamed: tuple[int, int] | None = None
         self._hung_s: float | None = None
+        self._nonsense: str | None = None
         self._alive = True
         self._decoders: dict[int, tuple[int, ViewDecoder]] = {}
         ours, theirs = Pipe()
-        self._connection: Connection[Order, Sent] = ours
+        self._connection: Connection[Any, Any] = ours
         life, self._life = os.pipe()
         descriptors = (theirs.fileno(), life, self._current.fd)
         arguments = (mapper, warm_up or "", publish_every_s, *descriptors)
@@ -86,8 +91,9 @@ class WorkerProcess:
 
     @property
     def killed(self) -> bool:
-        """Whether SIGKILL ended the child, and not because we had lost patience."""
-        return self._process.returncode == -signal.SIGKILL and self._hung_s is None
+        """Whether SIGKILL ended the child, and it was not ours."""
+        ours = self._hung_s is not None or self._nonsense is not None
+        return self._process.returncode == -signal.SIGKILL and not ours
 
     @property
     def last_words(self) -> str:
@@ -95,6 +101,8 @@ class WorkerProcess:
         code = self._process.returncode
         if self._hung_s is not None:
             return f"the worker did not come back within {self._hung_s:g} s"
+        if self._nonsense is not None:
+            return f"the worker sent what is no report: {self._nonsense}"
         if code is not None and code < 0:
             return f"the worker was ended by {signal.Signals(-code).name}"
         return f"the worker ended with code {code}"
@@ -117,14 +125,19 @@ class WorkerProcess:
         # A broken pipe is a dead child: the other thread tells.
         with contextlib.suppress(OSError):
             while (order := self._orders.get()) is not None:
-                self._connection.send(order)
+                self._connection.send_bytes(encode(order))
 
     def _receive_reports(self) -> None:
-        with contextlib.suppress(EOFError, OSError):
+        try:
             while True:
-                report = self._read(self._connection.recv())
+                report = self._read(decode(self._connection.recv_bytes(), Sent))
                 if report is not None:
                     self._tell(self._take, report)
+        except CodecError as error:
+            self._nonsense = str(error)
+            self._process.kill()
+        except (EOFError, OSError):
+            pass  # it has ended
         self._orders.put(None)
         self._process.wait()
         self._sender.join()  # before its pipe's number can be another's

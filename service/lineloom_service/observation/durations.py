@@ -5,12 +5,15 @@ from __future__ import annotations
 from bisect import bisect_left
 from dataclasses import dataclass, field
 
+from lineloom_core.codec import storable
+
 BOUNDS: tuple[float, ...] = tuple(
     factor * 10.0**power for power in range(-4, 2) for factor in (1, 2, 5)
 )
 """Upper ends of the buckets [s]; one more is without end."""
 
 
+@storable("histogram")
 @dataclass(slots=True)
 class Histogram:
     """counts: how many fell into each bucket. total: their sum [s]."""
@@ -38,6 +41,7 @@ class Histogram:
         return rows
 
 
+@storable("durations")
 @dataclass(slots=True)
 class Durations:
     """A histogram for every stage."""

@@ -23,6 +23,7 @@ class NewScan:
     body: bytes
 
 
+@storable("log-entry")
 @dataclass(frozen=True, slots=True)
 class LogEntry:
     """One entry of a site's log, at its place in the order in which the mapper is fed."""

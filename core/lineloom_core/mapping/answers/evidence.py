@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lineloom_core.check import Limit
+from lineloom_core.codec import storable
 
 Action = Literal["retract", "restore"]
 
 
+@storable("robot-move")
 @dataclass(frozen=True, slots=True)
 class RobotMove:
     """A robot's latest pose before and after.
@@ -28,6 +30,7 @@ class RobotMove:
     turned: float | None
 
 
+@storable("what-if")
 @dataclass(frozen=True, slots=True)
 class WhatIf:
     """What the action would do: components with their robots before and after, and every robot."""
@@ -39,6 +42,7 @@ class WhatIf:
     robots: tuple[RobotMove, ...]
 
 
+@storable("matched-lines")
 @dataclass(frozen=True, eq=False, slots=True)
 class MatchedLines:
     """Two lines taken for one wall: x1, y1, x2, y2 in the frame of keyframe a.
@@ -53,6 +57,7 @@ class MatchedLines:
     angle: float
 
 
+@storable("runner-up")
 @dataclass(frozen=True, slots=True)
 class RunnerUp:
     """The best other way to lay the two on each other: pose of keyframe b seen from keyframe a."""
@@ -63,6 +68,7 @@ class RunnerUp:
     evidence: float
 
 
+@storable("evidence")
 @dataclass(frozen=True, eq=False)
 class Evidence:
     """What speaks for a constraint and against it; all coordinates in the frame of keyframe a.

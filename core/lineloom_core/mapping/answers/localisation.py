@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lineloom_core.check import Limit
+from lineloom_core.codec import storable
 from lineloom_core.geometry import Pose
 
 LocalisationVerdict = Literal["unique", "ambiguous", "unknown"]
 
 
+@storable("pose-hypothesis")
 @dataclass(frozen=True, eq=False)
 class PoseHypothesis:
     """Where the scan may have been taken.
@@ -31,6 +33,7 @@ class PoseHypothesis:
     limits: dict[str, Limit] = field(default_factory=dict)
 
 
+@storable("localisation")
 @dataclass(frozen=True, eq=False)
 class Localisation:
     """Hypotheses, best first, and what may be concluded from them.
