@@ -198,16 +198,16 @@ def to_graph(site: str, view: SiteView) -> wire.Graph:
     return wire.Graph(graph=summary, nodes=nodes, edges=edges)
 
 
-def to_constraint(constraint: ConstraintView, robots: Mapping[int, str]) -> wire.Constraint:
-    """Return a constraint with its evidence. robots: the robot of each keyframe."""
+def to_constraint(constraint: ConstraintView) -> wire.Constraint:
+    """Return a constraint."""
     return wire.Constraint(
         id=constraint.id,
         kind=constraint.kind,
         state=constraint.state,
         keyframe_a=constraint.keyframe_a,
         keyframe_b=constraint.keyframe_b,
-        robot_a=robots.get(constraint.keyframe_a),
-        robot_b=robots.get(constraint.keyframe_b),
+        robot_a=constraint.scan_a.robot,
+        robot_b=constraint.scan_b.robot,
         T_a_b=_pose(constraint.T_a_b),
         information=matrix(constraint.information),
         reason=constraint.reason,

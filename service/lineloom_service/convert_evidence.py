@@ -14,11 +14,9 @@ from lineloom_core.mapping.answers.site_view import ConstraintView
 from lineloom_service.convert import figures, matrix, to_constraint
 
 
-def to_detail(
-    constraint: ConstraintView, robots: Mapping[int, str], evidence: Evidence | None
-) -> wire.ConstraintDetail:
+def to_detail(constraint: ConstraintView, evidence: Evidence | None) -> wire.ConstraintDetail:
     """Return a constraint with its evidence, None where the mapper could not be asked."""
-    basis = to_constraint(constraint, robots).model_dump()
+    basis = to_constraint(constraint).model_dump()
     if evidence is None:
         return wire.ConstraintDetail.model_validate(basis)
     best = evidence.runner_up

@@ -78,15 +78,15 @@ def _ties(view: SiteView, robot_a: str, robot_b: str) -> tuple[str, ...]:
     if robot_a not in latest or robot_b not in latest:
         return ()
     start, goal = latest[robot_a], latest[robot_b]
-    neighbours: dict[int, list[tuple[int, ConstraintView]]] = {}
+    neighbours: dict[str, list[tuple[str, ConstraintView]]] = {}
     for constraint in view.constraints:
         if constraint.state == "accepted":
             ends = constraint.keyframe_a, constraint.keyframe_b
             neighbours.setdefault(ends[0], []).append((ends[1], constraint))
             neighbours.setdefault(ends[1], []).append((ends[0], constraint))
     # Breadth first with weights 0 (sequential) and 1: lighter steps go to the front.
-    queue: deque[tuple[int, tuple[str, ...]]] = deque([(start, ())])
-    done: set[int] = set()
+    queue: deque[tuple[str, tuple[str, ...]]] = deque([(start, ())])
+    done: set[str] = set()
     while queue:
         node, ties = queue.popleft()
         if node == goal:

@@ -222,9 +222,9 @@ async def test_graph(client: httpx.AsyncClient) -> None:
     answer = (await _get(client, "/graph")).json()
     graph = nx.node_link_graph(answer, edges="edges")
     assert (graph.number_of_nodes(), graph.number_of_edges()) == (3, 1)
-    assert graph.nodes[0]["robot"] == "a"
+    assert graph.nodes["0"]["robot"] == "a"
     assert graph.graph == {"site": "office", "version": 9, "submaps": []}
-    assert list(graph.edges(keys=True)) == [(0, 2, "k0-2")]
+    assert list(graph.edges(keys=True)) == [("0", "2", "k0-2")]
     g2o = await _get(client, "/graph", format="g2o")
     assert g2o.text.count("VERTEX_SE2") == 3
     assert g2o.text.count("EDGE_SE2") == 1

@@ -40,9 +40,10 @@ FORGETS = "service/docs/api.md"
 """The page that deletes the site in the end comes last."""
 DATABASE = "postgresql+asyncpg://lineloom:secret@db/lineloom"
 TOKEN_ID = "1f0c2a9b77de"
+COMPONENT = "c-4hqxw2oklm3dv7ye"
 PAGES = sorted({block.page for block in blocks("sh")})
 PYTHON_PRINTS = {
-    "clients/python/README.md": r"(?s)^r1 c0 .*c1 joined c0 by \['",
+    "clients/python/README.md": r"(?s)^r1 c-\S+ .*c-\S+ joined c-\S+ by \['",
     "core/README.md": r"^$",
     "service/docs/quickstart.md": r"^r1 ",
     "service/docs/tuning.md": r"^$",
@@ -61,13 +62,14 @@ files, and the plan is another building's."""
 class Stage:
     """The one service, with a site that two robots drove through until they met.
 
-    rest: how r1 went on. constraint, export: ids of one each.
+    rest: how r1 went on. constraint, export, component: ids of one each.
     """
 
     url: str
     rest: list[Scan]
     constraint: str
     export: str
+    component: str
 
 
 @pytest.fixture(scope="module")
@@ -85,8 +87,9 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
                 client.wait_until_idle(SITE, 60.0)
             met = next(client.constraints(SITE, kind="rendezvous", state="accepted"))
             made = client.export(SITE, "svg")
+            component = client.site(SITE).components[0].id
         rest = [scan for robot, scan in drive[-40:] if robot == "r1"]
-        yield Stage(service.url, rest, met.id, made.id)
+        yield Stage(service.url, rest, met.id, made.id, component)
 
 
 @pytest.fixture
@@ -220,6 +223,7 @@ def _told(page: str, stage: Stage) -> dict[str, str]:
     host = stage.url.removeprefix("http://")
     told = {"localhost:8765": host, "lineloom.local:8765": host, 'token="…"': 'token="t"'}
     told |= {"/backup/": "backup/", "Fleet.office(seed=0)": "Fleet.office(seed=0, duration_s=4.0)"}
+    told[COMPONENT] = stage.component
     told[TOKEN_ID] = "$(lineloom token list --json | grep -o '[0-9a-f]\\{12\\}' | tail -1)"
     if page in FIRST_SCANS:
         told[SITE] = f"{SITE}-{page.count('/')}"

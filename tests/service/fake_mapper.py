@@ -39,10 +39,12 @@ from lineloom_core.mapping.answers.site_view import (
     SiteView,
 )
 from lineloom_core.mapping.answers.trajectories import Trajectories, Way, Whereabouts
+from lineloom_core.mapping.belief.claim import Claim
 from lineloom_core.mapping.belief.constraint_state import StateChange
 from lineloom_core.mapping.changes import Changes
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.facts.placed_scans import ScanBlock
+from lineloom_core.mapping.facts.scan_name import ScanName
 from lineloom_core.mapping.facts.unplaced_scan import UnplacedScan
 from lineloom_core.mapping.snapshot import Snapshot
 from lineloom_core.scan import Mount, Scan
@@ -115,15 +117,15 @@ class FakeMapper:
         self._scans.pop(robot, None)
         self._forgotten[robot] = len(self._history)
 
-    def retract(self, constraint: str) -> None:
+    def retract(self, constraint: str | Claim) -> None:
         self._version += 1
-        self._link("retract", constraint)
-        self._retracted[constraint] = self._version
+        self._link("retract", repr(constraint))
+        self._retracted[_name(constraint)] = self._version
 
-    def restore(self, constraint: str) -> None:
+    def restore(self, constraint: str | Claim) -> None:
         self._version += 1
-        self._link("restore", constraint)
-        self._retracted.pop(constraint, None)
+        self._link("restore", repr(constraint))
+        self._retracted.pop(_name(constraint), None)
 
     def rays(self, component: str) -> Rays:
         """A lidar at the origin that sees five walls a metre to five metres ahead."""
@@ -256,7 +258,9 @@ class FakeMapper:
 
     def _keyframes(self) -> list[KeyframeView]:
         return [
-            KeyframeView(i, robot, _component(robot), *self._scans[robot][-1], Pose(1.0, 0.0, 0.0))
+            KeyframeView(
+                str(i), robot, _component(robot), *self._scans[robot][-1], Pose(1.0, 0.0, 0.0)
+            )
             for i, robot in enumerate(sorted(self._scans))
         ]
 
@@ -272,6 +276,9 @@ class FakeMapper:
                 T_a_b=Pose(0.0, 0.0, 0.0),
                 information=np.eye(3),
                 reason="they met",
+                origin="recognition",
+                scan_a=_scan_name(a),
+                scan_b=_scan_name(b),
                 checks={"conflict": 0.02, "unknown": float("nan")},
                 residual=0.5,
                 history=(StateChange(1, "accepted", "they met"),),
@@ -283,14 +290,18 @@ class FakeMapper:
                 id="k-rejected",
                 kind="loop",
                 state="rejected",
-                keyframe_a=0,
-                keyframe_b=0,
+                keyframe_a="0",
+                keyframe_b="0",
                 T_a_b=Pose(0.0, 0.0, 0.0),
                 information=np.eye(3),
                 reason="conflict",
+                origin="near",
+                scan_a=_scan_name(k),
+                scan_b=_scan_name(k),
             )
+            for k in keyframes[:1]
         ]
-        return accepted + rejected if keyframes else []
+        return accepted + rejected
 
 
 def _unsealed(chapter: bytes) -> list[tuple[str, str, int, float]]:
@@ -309,6 +320,14 @@ def _block(keyframe: int, scans: list[tuple[str, int, float]]) -> ScanBlock:
         np.full(len(scans), keyframe),
         np.array([[i + 1.0, 0.0, 0.0] for i in range(len(scans))]),
     )
+
+
+def _name(constraint: str | Claim) -> str:
+    return constraint if isinstance(constraint, str) else constraint.constraint
+
+
+def _scan_name(keyframe: KeyframeView) -> ScanName:
+    return ScanName(keyframe.robot, keyframe.session, keyframe.seq)
 
 
 def _component(robot: str) -> str:

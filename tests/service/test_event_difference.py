@@ -17,6 +17,7 @@ from lineloom_core.mapping.answers.site_view import (
     RobotView,
     SiteView,
 )
+from lineloom_core.mapping.facts.scan_name import ScanName
 from lineloom_service.engine.published import EMPTY_VIEW
 from lineloom_service.events.difference import MOST_LINES_LISTED, events_between
 
@@ -32,12 +33,16 @@ def _robot(name: str, scans: int, component: str = "c1", **changes: Any) -> Robo
 
 
 def _constraint(name: str, state: Any, a: int = 0, b: int = 1) -> ConstraintView:
-    return ConstraintView(name, "rendezvous", state, a, b, Pose(0, 0, 0), np.eye(3), "because")
+    scans = (ScanName("ab"[a], "0", 0), ScanName("ab"[b], "0", 0))
+    return ConstraintView(
+        name, "rendezvous", state, str(a), str(b), Pose(0, 0, 0), np.eye(3), "because",
+        "recognition", *scans,
+    )  # fmt: skip
 
 
 def _keyframes(**component_of: str) -> tuple[KeyframeView, ...]:
     return tuple(
-        KeyframeView(i, robot, component, "0", 0, 0.0, Pose(0, 0, 0))
+        KeyframeView(str(i), robot, component, "0", 0, 0.0, Pose(0, 0, 0))
         for i, (robot, component) in enumerate(component_of.items())
     )
 

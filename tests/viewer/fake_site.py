@@ -126,10 +126,13 @@ class FakeSite:
             *range(STEPS - 1),
             *range(STEPS, 2 * STEPS - 1),
         ]
-        edges = [{"source": i, "target": i + 1, "key": f"s{i}", "kind": "sequential"} for i in ways]
+        edges = [
+            {"source": f"k{i}", "target": f"k{i + 1}", "key": f"s{i}", "kind": "sequential"}
+            for i in ways
+        ]
         submaps = [
-            {"id": 0, "robot": "ada", "anchor": 2, "keyframes": [0, 1, 2, 3, 4]},
-            {"id": 1, "robot": "bob", "anchor": 14, "keyframes": [12, 13, 14, 15]},
+            {"id": "a", "robot": "ada", "anchor": "k2", "keyframes": [f"k{i}" for i in range(5)]},
+            {"id": "b", "robot": "bob", "anchor": "k14", "keyframes": ["k12", "k13", "k14", "k15"]},
         ]
         summary = {"site": SITE, "version": self.version, "submaps": submaps}
         return {"graph": summary, "nodes": nodes, "edges": edges}
@@ -194,7 +197,7 @@ class FakeSite:
     def _keyframe(self, number: int, robot: str, component: str, step: int) -> dict[str, Any]:
         placed = self._placed(component, 1.0 + step / 4, 2.0, 0.0)
         stamp = {"session": "0", "seq": step, "stamp": 1000.0 + step}
-        return {"id": number, "robot": robot, **stamp, **placed}
+        return {"id": f"k{number}", "robot": robot, **stamp, **placed}
 
     def _turn(self, before: str, after: str, reason: str) -> None:
         for constraint in self.constraints:
@@ -203,7 +206,7 @@ class FakeSite:
 
 
 def _candidate(identity: str) -> dict[str, Any]:
-    a, b = (int(part) for part in identity[1:].split("-"))
+    a, b = (f"k{part}" for part in identity[1:].split("-"))
     return {
         "id": identity,
         "kind": "rendezvous",

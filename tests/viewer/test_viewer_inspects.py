@@ -183,7 +183,7 @@ def test_the_slider_says_what_it_shows(fake: FakeServer, page: Page) -> None:
     expect(said).to_contain_text("Version 40, as received")
     expect_components(page, "c0", "c1")
     slider.press("Home")
-    expect(said).to_have_text("Rebuilt from today's map, up to keyframe 0")
+    expect(said).to_have_text("Rebuilt from today's map, 1 keyframe in")
     assert page.evaluate("() => lineloom.view.state.lines.length") < 8
     page.get_by_role("button", name="Live", exact=True).click()
     expect_components(page, "c0")

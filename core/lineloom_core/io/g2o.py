@@ -13,26 +13,28 @@ def write_graph(view: SiteView) -> str:
     Full precision (17 digits where needed; gtsam's own writer keeps 6). Information is the upper
     triangle, row by row, in the axes of the second node, order x, y, theta. The oldest keyframe of
     each component is fixed: components are unrelated and each needs its own gauge. Candidates,
-    rejected and retracted constraints are no part of the graph.
+    rejected and retracted constraints are no part of the graph. Vertices are numbered in the order
+    of the view, for g2o knows no other names.
     """
-    keyframes = sorted(view.keyframes, key=lambda k: k.id)
-    rows = [_vertex(keyframe) for keyframe in keyframes]
+    number = {keyframe.id: i for i, keyframe in enumerate(view.keyframes)}
+    rows = [_vertex(i, keyframe) for i, keyframe in enumerate(view.keyframes)]
     anchors: dict[str, int] = {}
-    for keyframe in keyframes:
-        anchors.setdefault(keyframe.component, keyframe.id)
-    rows += [_edge(c) for c in view.constraints if c.state == "accepted"]
+    for i, keyframe in enumerate(view.keyframes):
+        anchors.setdefault(keyframe.component, i)
+    rows += [_edge(c, number) for c in view.constraints if c.state == "accepted"]
     # Last: gtsam's reader stops at the first tag that it does not know.
     rows += [f"FIX {anchor}" for anchor in anchors.values()]
     return "".join(row + "\n" for row in rows)
 
 
-def _vertex(keyframe: KeyframeView) -> str:
+def _vertex(number: int, keyframe: KeyframeView) -> str:
     pose = keyframe.pose
-    return f"VERTEX_SE2 {keyframe.id} {pose.x!r} {pose.y!r} {pose.theta!r}"
+    return f"VERTEX_SE2 {number} {pose.x!r} {pose.y!r} {pose.theta!r}"
 
 
-def _edge(constraint: ConstraintView) -> str:
+def _edge(constraint: ConstraintView, number: dict[str, int]) -> str:
     T = constraint.T_a_b
     upper = constraint.information[np.triu_indices(3)].tolist()
     figures = " ".join(repr(value) for value in (T.x, T.y, T.theta, *upper))
-    return f"EDGE_SE2 {constraint.keyframe_a} {constraint.keyframe_b} {figures}"
+    a, b = number[constraint.keyframe_a], number[constraint.keyframe_b]
+    return f"EDGE_SE2 {a} {b} {figures}"

@@ -34,7 +34,7 @@ def advance(site: SiteMap, keyframe: Keyframe) -> Changes:
     moved = _near_loop_if_due(site, keyframe.id)
     place = _place_if_due(site, site.track(keyframe.id)) if keyframe.trusted else None
     if place is None:
-        return Changes(placed=True, keyframe=keyframe.id, optimised=moved)
+        return Changes(placed=True, keyframe=keyframe.name, optimised=moved)
     merges, moved_too = consider(site, place)
     for merge in merges:
         _tie_after(site, merge)
@@ -43,7 +43,7 @@ def advance(site: SiteMap, keyframe: Keyframe) -> Changes:
         thin(site, place)
     return Changes(
         placed=True,
-        keyframe=keyframe.id,
+        keyframe=keyframe.name,
         merges=tuple(merges),
         withdrawn=contradicted,
         optimised=moved or moved_too or bool(contradicted),

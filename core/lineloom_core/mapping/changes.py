@@ -20,7 +20,7 @@ class Changes:
 
     placed: bool
     started_component: str | None = None
-    keyframe: int | None = None
+    keyframe: str | None = None
     merges: tuple[ComponentMerged, ...] = ()
     withdrawn: tuple[Constraint, ...] = ()
     optimised: bool = False

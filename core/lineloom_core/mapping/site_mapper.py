@@ -28,17 +28,22 @@ from lineloom_core.mapping.answers.view_builder import build_view
 from lineloom_core.mapping.answers.what_if import what_if
 from lineloom_core.mapping.belief.by_reference import dumps, loads
 from lineloom_core.mapping.belief.checkpoints import Checkpoints
+from lineloom_core.mapping.belief.claim import Claim
 from lineloom_core.mapping.belief.constraint import Constraint
 from lineloom_core.mapping.belief.memory import Memory
 from lineloom_core.mapping.belief.rebuild import first_affected, rebuild
+from lineloom_core.mapping.belief.sameness import is_meant
 from lineloom_core.mapping.belief.site_map import SiteMap
+from lineloom_core.mapping.belief.standing import standing
 from lineloom_core.mapping.belief.verdicts import Verdicts
 from lineloom_core.mapping.changes import Changes
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.digest import digest
 from lineloom_core.mapping.facts.front_end import take
 from lineloom_core.mapping.facts.history import History
+from lineloom_core.mapping.facts.ids import id_of
 from lineloom_core.mapping.facts.keyframe import Keyframe
+from lineloom_core.mapping.facts.ordinals import id_of_ordinal
 from lineloom_core.mapping.facts.robot_record import RobotRecord
 from lineloom_core.mapping.snapshot import Snapshot, SnapshotError
 from lineloom_core.scan import Mount, Scan
@@ -100,7 +105,9 @@ class SiteMapper:
             self._rebuild(self._site.verdicts.withdraw(changes.withdrawn))
         else:
             self._checkpoints.note(self._site, keyframe.id)
-        return replace(changes, started_component=f"c{keyframe.track}") if started else changes
+        if not started:
+            return changes
+        return replace(changes, started_component=id_of("component", keyframe.scan_name))
 
     def set_mount(self, robot: str, mount: Mount) -> None:
         """Set where a robot's lidar sits; `inverted` counts for the scans that follow."""
@@ -125,22 +132,35 @@ class SiteMapper:
         """Count a log entry that changes nothing: parameters hold from the first scan on."""
         self._version += 1
 
-    def retract(self, constraint: str) -> None:
+    def retract(self, constraint: str | Claim) -> None:
         """Make the map as if the constraint had never been accepted, for good.
 
-        Of a recognition, all that says the same is refused with it. An unknown or retracted one
-        changes nothing.
+        Of a recognition, all that says the same is refused with it. A retracted one, or one of
+        which only an id is known, and no constraint of that id, changes nothing. A claim that no
+        constraint makes stands (`standing`), and bars what makes it when that comes up.
         """
         self._version += 1
-        known = self._find(constraint)
+        known = self._named(constraint)
         if known is not None and known.id not in self._site.verdicts.retracted:
             self._rebuild(self._retracting(known).operators_only())
 
-    def restore(self, constraint: str) -> None:
-        """Take a retraction back, or overrule a withdrawal; the map is as if it had not been."""
+    def restore(self, constraint: str | Claim) -> None:
+        """Take a retraction back, or overrule a withdrawal; the map is as if it had not been.
+
+        A claim of which neither is known is vouched for: what makes it is never withdrawn.
+        """
         self._version += 1
-        if self._site.verdicts.barred(constraint) is not None:
-            self._rebuild(self._site.verdicts.restore(constraint).operators_only())
+        known, verdicts = self._named(constraint), self._site.verdicts
+        if known is None:
+            return
+        meant = [c.id for c in verdicts.withdrawn.values() if is_meant(self._site, known, c)]
+        barred = [known.id] if verdicts.barred(known.id) else meant
+        for name in barred:
+            verdicts = verdicts.restore(name)
+        if barred:
+            self._rebuild(verdicts.operators_only())
+        elif isinstance(constraint, Claim):
+            self._site.verdicts = verdicts.vouch(known)
 
     def what_if(self, constraint: str) -> WhatIf | None:
         """What retracting a constraint (or restoring a retracted one) would do; changes nothing.
@@ -150,14 +170,14 @@ class SiteMapper:
         known = self._find(constraint)
         if known is None:
             return None
-        action: Action = "restore" if self._site.verdicts.barred(constraint) else "retract"
+        action: Action = "restore" if self._site.verdicts.barred(known.id) else "retract"
         verdicts = (
             self._retracting(known)
             if action == "retract"
-            else self._site.verdicts.restore(constraint)
+            else self._site.verdicts.restore(known.id)
         )
         other = self._rebuilt(self._checkpoints.copy(), verdicts.operators_only())
-        return what_if(action, constraint, self._site, other, self._robots)
+        return what_if(action, known.id, self._site, other, self._robots)
 
     def explain(self, constraint: str) -> Evidence | None:
         """What speaks for a constraint and against it; None for an unknown one."""
@@ -218,10 +238,19 @@ class SiteMapper:
         self._rebuild(self._site.verdicts, self._history.of(robot, session)[0])
         kept = self._site.constraints
         gone = (c for c in tied if c.id not in kept or kept[c.id].state != "accepted")
-        return Changes(placed=True, keyframe=keyframe.id, withdrawn=tuple(gone), optimised=True)
+        return Changes(placed=True, keyframe=keyframe.name, withdrawn=tuple(gone), optimised=True)
 
     def _find(self, constraint: str) -> Constraint | None:
-        return self._site.verdicts.barred(constraint) or self._site.constraints.get(constraint)
+        name = id_of_ordinal(constraint, self._history)
+        return self._site.verdicts.barred(name) or self._site.constraints.get(name)
+
+    def _named(self, constraint: str | Claim) -> Constraint | None:
+        """The constraint of an id, or what makes a claim, or else what stands for it."""
+        if isinstance(constraint, str):
+            return self._find(constraint)
+        found = self._find(constraint.constraint)
+        places = self._config.places
+        return found or standing(constraint, self._history, self._robots, places)
 
     def _retracting(self, constraint: Constraint) -> Verdicts:
         gone = constraint.moved_to("retracted", "retracted by an operator", self._version)

@@ -114,7 +114,7 @@ def trials(kind: str, seed: int, lidar: Lidar, count: int, duration_s: float) ->
 
 def _chart(world: World, lidar: Lidar, seed: int, duration_s: float) -> _Charted:
     fleet = Fleet.touring(world, robots=2, seed=seed, duration_s=duration_s, lidar=lidar, people=2)
-    mapper, truth = SiteMapper(), dict[int, Pose]()
+    mapper, truth = SiteMapper(), dict[str, Pose]()
     for s in fleet.scans():
         keyframe = mapper.add(s.robot, s.scan).keyframe
         if keyframe is not None:

@@ -144,19 +144,19 @@ def _misfit(found: NDArray[np.float64], true: NDArray[np.float64]) -> float:
     return float(np.sum(wrap_array(steps) ** 2))
 
 
-def _ends(constraint: ConstraintView) -> tuple[int, int]:
+def _ends(constraint: ConstraintView) -> tuple[str, str]:
     return constraint.keyframe_a, constraint.keyframe_b
 
 
 def _tracks(view: SiteView) -> dict[int, list[KeyframeView]]:
-    """Pieces of tracking, by their first keyframe: what sequential constraints hold together."""
+    """Pieces of tracking, numbered by their first keyframe: what steps hold together."""
     chain = nx.Graph()
-    frames = {k.id: k for k in view.keyframes}
-    chain.add_nodes_from(frames)
+    number = {k.id: i for i, k in enumerate(view.keyframes)}
+    chain.add_nodes_from(number.values())
     steps = (c for c in view.constraints if c.kind == "sequential" and c.state == "accepted")
-    chain.add_edges_from(_ends(c) for c in steps)
+    chain.add_edges_from((number[c.keyframe_a], number[c.keyframe_b]) for c in steps)
     pieces = (sorted(piece) for piece in nx.connected_components(chain))
-    return {piece[0]: [frames[k] for k in piece] for piece in pieces}
+    return {piece[0]: [view.keyframes[i] for i in piece] for piece in pieces}
 
 
 def _joints(

@@ -6,12 +6,13 @@ import importlib
 from typing import Any, Protocol
 
 from lineloom_core.mapping.answers.site_view import SiteView
+from lineloom_core.mapping.belief.claim import Claim
 from lineloom_core.mapping.changes import Changes
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.snapshot import Snapshot
 from lineloom_core.scan import Mount, Scan
 
-from lineloom_service.store.codec import decode_mount, decode_scan
+from lineloom_service.store.codec import decode_claim, decode_mount, decode_scan
 from lineloom_service.store.records import LogEntry
 
 SITE_MAPPER = "lineloom_core.mapping.site_mapper:SiteMapper"
@@ -36,11 +37,11 @@ class Mapper(Protocol):
         """Remove a robot."""
         ...
 
-    def retract(self, constraint: str) -> None:
+    def retract(self, constraint: str | Claim) -> None:
         """Believe a constraint no longer."""
         ...
 
-    def restore(self, constraint: str) -> None:
+    def restore(self, constraint: str | Claim) -> None:
         """Take a retraction back."""
         ...
 
@@ -88,9 +89,8 @@ def apply(mapper: Mapper, entry: LogEntry) -> None:
         mapper.set_mount(entry.robot, mount)
         return
     if entry.kind in ("retract", "restore"):
-        constraint = (entry.body or b"").decode()
         act = mapper.retract if entry.kind == "retract" else mapper.restore
-        act(constraint)
+        act(decode_claim(entry.body or b""))
         return
     if entry.body is None or entry.session is None or entry.seq is None:
         raise ValueError("a scan entry has no body, session or seq")

@@ -26,7 +26,7 @@ def events_between(old: SiteView, new: SiteView, at: float) -> list[wire.AnyEven
     change = ViewChange.between(old, new)
     found: list[wire.AnyEvent] = []
     found += _scans(change, old, at)
-    found += _constraints(change, old, new, at)
+    found += _constraints(change, old, at)
     found += _merges(change, old, new, at)
     found += _splits(change, old, new, at)
     found += _map(change, at)
@@ -77,30 +77,20 @@ def _state_of(robot: RobotView) -> tuple[object, ...]:
     return robot.component, robot.pose, robot.state, robot.keyframes, robot.health
 
 
-def _constraints(
-    change: ViewChange, old: SiteView, new: SiteView, at: float
-) -> Iterator[wire.ConstraintEvent]:
+def _constraints(change: ViewChange, old: SiteView, at: float) -> Iterator[wire.ConstraintEvent]:
     known = {constraint.id: constraint for constraint in old.constraints}
     states = {id: constraint.state for id, constraint in known.items()}
-    moved = [c for c in change.constraints.new.values() if c.state != states.get(c.id)]
-    robots = _robots_of(new) if moved else {}
-    for c in moved:
-        yield _constraint(c, c.state, states.get(c.id), robots, change.version, at)
-    gone = [known[id] for id in change.constraints.gone]
-    robots = _robots_of(old) if gone else {}
-    for c in gone:
-        yield _constraint(c, "removed", c.state, robots, change.version, at)
-
-
-def _robots_of(view: SiteView) -> dict[int, str]:
-    return {keyframe.id: keyframe.robot for keyframe in view.keyframes}
+    for c in change.constraints.new.values():
+        if c.state != states.get(c.id):
+            yield _constraint(c, c.state, states.get(c.id), change.version, at)
+    for id in change.constraints.gone:
+        yield _constraint(known[id], "removed", known[id].state, change.version, at)
 
 
 def _constraint(
     constraint: ConstraintView,
     state: ConstraintState | Literal["removed"],
     was: ConstraintState | None,
-    robots: dict[int, str],
     version: int,
     at: float,
 ) -> wire.ConstraintEvent:
@@ -113,8 +103,8 @@ def _constraint(
         was=was,
         keyframe_a=constraint.keyframe_a,
         keyframe_b=constraint.keyframe_b,
-        robot_a=robots.get(constraint.keyframe_a),
-        robot_b=robots.get(constraint.keyframe_b),
+        robot_a=constraint.scan_a.robot,
+        robot_b=constraint.scan_b.robot,
         reason=constraint.reason,
     )
 

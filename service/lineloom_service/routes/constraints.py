@@ -31,6 +31,7 @@ from lineloom_service.map_frames import versioned
 from lineloom_service.openapi import NOT_MODIFIED, also_as
 from lineloom_service.service import Service
 from lineloom_service.store.actions import act
+from lineloom_service.store.codec import encode_claim
 from lineloom_service.store.records import ActionKind, SiteRecord
 
 _FORMATS = ("json", "svg")
@@ -91,7 +92,7 @@ async def get_constraint(
             raise
         evidence = None  # what is known without the mapper is worth an answer
     if format == "json":
-        return answer(to_detail(found, _robots(view), evidence))
+        return answer(to_detail(found, evidence))
     if evidence is None:
         raise _unknown(site, constraint)
     drawing = await asyncio.to_thread(draw_evidence, found, evidence)
@@ -135,15 +136,15 @@ async def _act(
 ) -> Response:
     """Log an action, wait until the map has followed it, and return the constraint then."""
     constraint = _find(site, view, name)
-    robots = _robots(view)
-    robot = robots.get(constraint.keyframe_b) or robots.get(constraint.keyframe_a, "")
-    position = await service.store.write(act, site.name, robot, action, name)
+    body = encode_claim(constraint.claim)
+    robot = constraint.scan_b.robot
+    position = await service.store.write(act, site.name, robot, action, body)
     if position is None:
         raise _unknown(site, name)
     followed = await service.conductor.reached(site.id, position, _FOLLOW_S)
     view = service.conductor.published(site.id).view
     now = next((c for c in view.constraints if c.id == name), constraint)
-    return answer(to_constraint(now, _robots(view)), status=200 if followed else 202)
+    return answer(to_constraint(now), status=200 if followed else 202)
 
 
 def _find(site: SiteRecord, view: SiteView, name: str) -> ConstraintView:
@@ -170,14 +171,10 @@ def _after(view: SiteView, cursor: str | None) -> tuple[ConstraintView, ...]:
 def _page(
     site: str, view: SiteView, found: Sequence[ConstraintView], limit: int
 ) -> wire.ConstraintPage:
-    page, robots = found[:limit], _robots(view)
+    page = found[:limit]
     return wire.ConstraintPage(
         site=site,
         version=view.version,
-        constraints=[to_constraint(constraint, robots) for constraint in page],
+        constraints=[to_constraint(constraint) for constraint in page],
         next_cursor=page[-1].id if len(found) > limit else None,
     )
-
-
-def _robots(view: SiteView) -> dict[int, str]:
-    return {keyframe.id: keyframe.robot for keyframe in view.keyframes}

@@ -126,17 +126,17 @@ def forget_robot(tx: Transaction, site_name: str, robot_name: str) -> bool:
 
 
 def act(
-    tx: Transaction, site_name: str, robot_name: str, kind: ActionKind, constraint: str
+    tx: Transaction, site_name: str, robot_name: str, kind: ActionKind, claim: bytes
 ) -> int | None:
-    """Log what an operator does to a constraint of a robot; return the entry's position.
+    """Log what an operator does to a robot's constraint; return the entry's position.
 
-    None where there is no such robot.
+    claim: what it says, as `codec.encode_claim` has it. None where there is no such robot.
     """
     site = tx.ledger.sites.get(site_name)
     robot = None if site is None else site.robots.get(robot_name)
     if site is None or robot is None:
         return None
-    tx.add_control(site, robot, kind, constraint.encode())
+    tx.add_control(site, robot, kind, claim)
     return site.position
 
 

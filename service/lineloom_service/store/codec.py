@@ -11,6 +11,8 @@ from typing import Any
 import msgpack
 import numpy as np
 from lineloom_core.geometry import Pose
+from lineloom_core.mapping.belief.claim import Claim
+from lineloom_core.mapping.facts.scan_name import ScanName
 from lineloom_core.scan import Mount, Scan
 from numpy.typing import NDArray
 
@@ -83,6 +85,30 @@ def decode_mount(body: bytes) -> Mount:
     """Return the mount that was encoded."""
     fields = _unpack(body, 5)
     return Mount(T_base_laser=Pose(fields[1], fields[2], fields[3]), inverted=fields[4])
+
+
+def encode_claim(claim: Claim) -> bytes:
+    """Return what an action is about: the scans that it rests on, and how they were said to lie.
+
+    All that a replay needs to find it again, under whatever parameters and by whatever code.
+    """
+    T = claim.T_a_b
+    ends = [(s.robot, s.session, s.seq, s.repeat) for s in (claim.scan_a, claim.scan_b)]
+    packed: bytes = msgpack.packb(
+        (_FORMAT, claim.constraint, claim.kind, claim.origin, *ends, (T.x, T.y, T.theta))
+    )
+    return packed
+
+
+def decode_claim(body: bytes) -> Claim | str:
+    """Return the claim that was encoded; of a former version's log the name that it had by number.
+
+    Those logs hold the name as text, whose letters no list of msgpack begins with.
+    """
+    if body[:1].isalpha():
+        return body.decode()
+    _, constraint, kind, origin, a, b, T_a_b = _unpack(body, 7)
+    return Claim(constraint, kind, origin, ScanName(*a), ScanName(*b), Pose(*T_a_b))
 
 
 def _unpack(body: bytes, length: int) -> list[Any]:

@@ -11,7 +11,7 @@ from lineloom_service.store.config_entry import ConfigEntry
 
 EntryKind = Literal["scan", "mount", "forget", "retract", "restore", "config"]
 ActionKind = Literal["retract", "restore"]
-"""What an operator can do to a constraint; the entry's body is its id."""
+"""What an operator can do to a constraint; the entry's body is what it claims (`store.codec`)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,8 @@ from lineloom_core.mapping.answers.site_view import (
     SiteView,
     TrajectoryView,
 )
+from lineloom_core.mapping.belief.constraint_state import ConstraintState
+from lineloom_core.mapping.facts.scan_name import ScanName
 from numpy.typing import NDArray
 
 Wall = tuple[float, float, float, float]
@@ -115,7 +117,7 @@ def site_view() -> SiteView:
     lines = lines_of("c1", floor_walls(), ["alice", "bob"], 0) + lines_of("c3", small, ["carol"], 1)
     keyframes = [
         KeyframeView(
-            10 * i + k,
+            f"k{10 * i + k}",
             name,
             names[name],
             "0",
@@ -144,7 +146,7 @@ def constraints(keyframes: list[KeyframeView]) -> list[ConstraintView]:
     )
     found = [
         ConstraintView(
-            f"s{a.id}",
+            f"s{a.id[1:]}",
             "sequential",
             "accepted",
             a.id,
@@ -152,13 +154,22 @@ def constraints(keyframes: list[KeyframeView]) -> list[ConstraintView]:
             a.pose.between(b.pose),
             information,
             "",
+            "step",
+            ScanName(a.robot, a.session, a.seq),
+            ScanName(b.robot, b.session, b.seq),
         )
         for a, b in itertools.pairwise(keyframes)
         if a.robot == b.robot
     ]
-    for k, state in enumerate(("accepted", "candidate", "rejected", "retracted")):
+    states: tuple[ConstraintState, ...] = ("accepted", "candidate", "rejected", "retracted")
+    for k, state in enumerate(states):
         T = Pose(math.pi / 10 + k, 1e-7, -math.e / 3)
+        a, b = keyframes[1], keyframes[4 + k % 2]
+        scans = [ScanName(f.robot, f.session, f.seq) for f in (a, b)]
         found.append(
-            ConstraintView(f"r{k}", "rendezvous", state, 1, 11 + k % 2, T, information, "test")  # type: ignore[arg-type]
-        )
+            ConstraintView(
+                f"r{k}", "rendezvous", state, a.id, b.id, T, information, "test",
+                "recognition", scans[0], scans[1],
+            )
+        )  # fmt: skip
     return found

@@ -95,13 +95,15 @@ def mapped(scans: Iterable[SimulatedScan]) -> SiteMapper:
 
 
 def component_error(
-    view: SiteView, scans: Sequence[SimulatedScan], component: str
+    view: SiteView, scans: Sequence[SimulatedScan], component: str | None = None
 ) -> TrajectoryError:
     """Error of all trajectories in a component against the truth, one rigid motion aside.
 
+    component: the oldest if None.
     Robots with wrong relative poses cannot hide in it: all are aligned together.
     """
     truth = {(s.robot, s.scan.session, s.scan.seq): s.true_pose.to_array() for s in scans}
+    component = component or view.components[0].id
     estimate, true = [], []
     for robot, trajectory in view.trajectories.items():
         for i in range(len(trajectory.seq)):

@@ -10,6 +10,7 @@ from lineloom_core.io.evidence_drawing import draw_evidence
 from lineloom_core.io.svg import to_svg
 from lineloom_core.mapping.answers.evidence import Evidence
 from lineloom_core.mapping.answers.site_view import ConstraintView
+from lineloom_core.mapping.belief.claim import Origin
 from lineloom_core.mapping.site_mapper import SiteMapper
 from lineloom_lab.simulation import (
     Fleet,
@@ -30,19 +31,24 @@ def mapper() -> SiteMapper:
     return mapped(list(fleet.scans()))
 
 
-def explained(mapper: SiteMapper, prefix: str, state: str) -> list[tuple[ConstraintView, Evidence]]:
+ORIGINS: tuple[Origin, ...] = ("near", "step")
+
+
+def explained(
+    mapper: SiteMapper, origin: Origin, state: str
+) -> list[tuple[ConstraintView, Evidence]]:
     rows = []
     for c in mapper.view().constraints:
-        if c.id.startswith(prefix) and c.state == state:
+        if c.origin == origin and c.state == state:
             evidence = mapper.explain(c.id)
             assert evidence is not None
             rows.append((c, evidence))
-    assert rows, (prefix, state)
+    assert rows, (origin, state)
     return rows
 
 
 def test_an_accepted_recognition_shows_walls_that_lie_on_each_other(mapper: SiteMapper) -> None:
-    for c, evidence in explained(mapper, "p", "accepted"):
+    for c, evidence in explained(mapper, "recognition", "accepted"):
         assert len(evidence.matched) >= 3
         for pair in evidence.matched:
             assert pair.distance < 0.25
@@ -69,15 +75,15 @@ def test_a_refused_recognition_fails_the_check_it_names() -> None:
             name, world, lidar=sick_lms200(), seed=3, duration_s=50.0
         ).scans()
     ]
-    rows = explained(mapped(log), "p", "rejected")
+    rows = explained(mapped(log), "recognition", "rejected")
     at_first = ("matched", "overlap", "conflict_share", "margin", "information")
     for c, evidence in rows:
         assert any(not evidence.limits[name].holds for name in at_first), c.reason
 
 
 def test_loops_and_steps_are_explained_too(mapper: SiteMapper) -> None:
-    for prefix in ("n", "s"):
-        for c, evidence in explained(mapper, prefix, "accepted")[:10]:
+    for origin in ORIGINS:
+        for c, evidence in explained(mapper, origin, "accepted")[:10]:
             assert evidence.matched
             assert all(limit.holds for limit in evidence.limits.values()), c
             assert (evidence.votes, evidence.runner_up) == (None, None)
@@ -85,7 +91,7 @@ def test_loops_and_steps_are_explained_too(mapper: SiteMapper) -> None:
 
 def test_matched_walls_are_the_same_from_either_side(mapper: SiteMapper) -> None:
     """In the frame of keyframe a the matched lines lie on each other, whatever that frame is."""
-    for _, evidence in explained(mapper, "p", "accepted"):
+    for _, evidence in explained(mapper, "recognition", "accepted"):
         for pair in evidence.matched:
             p, q = np.array(pair.reference[:2]), np.array(pair.reference[2:])
             u = (q - p) / np.linalg.norm(q - p)
@@ -95,7 +101,7 @@ def test_matched_walls_are_the_same_from_either_side(mapper: SiteMapper) -> None
 
 def test_a_runner_up_is_another_pose(mapper: SiteMapper) -> None:
     config = mapper.config.recognition
-    for c, evidence in explained(mapper, "p", "accepted"):
+    for c, evidence in explained(mapper, "recognition", "accepted"):
         if evidence.runner_up is None:
             continue
         apart = math.hypot(evidence.runner_up.x - c.T_a_b.x, evidence.runner_up.y - c.T_a_b.y)
@@ -107,12 +113,12 @@ def test_a_runner_up_is_another_pose(mapper: SiteMapper) -> None:
 def test_explaining_changes_nothing_and_unknown_ones_are_none(mapper: SiteMapper) -> None:
     before = fingerprint(mapper.view())
     assert mapper.explain("p98-99") is None
-    explained(mapper, "p", "accepted")
+    explained(mapper, "recognition", "accepted")
     assert fingerprint(mapper.view()) == before
 
 
 def test_the_drawing_shows_both_places_and_every_figure(mapper: SiteMapper) -> None:
-    c, evidence = explained(mapper, "p", "accepted")[0]
+    c, evidence = explained(mapper, "recognition", "accepted")[0]
     text = to_svg(draw_evidence(c, evidence))
     for name in c.checks:
         assert evidence.limits[name].means in text

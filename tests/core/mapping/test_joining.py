@@ -85,11 +85,12 @@ def spread(meeting: Meeting, count: int) -> Sequence[int]:
 
 def test_three_that_agree_join_two_robots_where_they_are(meeting: Meeting) -> None:
     made = [meeting.candidate(i) for i in spread(meeting, 3)]
+    names = tuple(meeting.site.component_id(track[0]) for track in (meeting.a, meeting.b))
     merged = meeting.join()
     assert merged is not None
-    assert (merged.survivor, merged.absorbed) == ("c0", "c1")
+    assert (merged.survivor, merged.absorbed) == names
     assert sorted(merged.constraints) == sorted(c.id for c in made)
-    assert meeting.site.merged_into == {"c1": "c0"}
+    assert meeting.site.merged_into == {names[1]: names[0]}
     assert meeting.worst_error() < 0.01
     for name in merged.constraints:
         stored = meeting.site.constraints[name]

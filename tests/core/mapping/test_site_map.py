@@ -95,10 +95,10 @@ def test_only_accepted_constraints_hold_the_graph_together(
     assert not site.same_component(a[0], b[0])
     site.add_constraint(made.moved_to("accepted", "for the test"))
     assert site.same_component(a[0], b[0])
-    assert site.component_id(b[4]) == site.component_id(a[0]) == "c0"
+    assert site.component_id(b[4]) == site.component_id(a[0]) == site.id_of("component", a[0])
     site.add_constraint(made.moved_to("rejected", "for the test"))
     assert not site.same_component(a[0], b[0])
-    assert site.component_id(b[4]) == "c1"
+    assert site.component_id(b[4]) == site.id_of("component", b[0])
 
 
 def test_optimising_pulls_a_bent_track_straight_and_keeps_the_anchor(

@@ -25,6 +25,7 @@ from lineloom_core.mapping.answers.trajectories import Trajectories, Way, Wherea
 from lineloom_core.mapping.answers.view_change import TABLES, ViewChange
 from lineloom_core.mapping.belief.constraint_state import StateChange
 from lineloom_core.mapping.facts.placed_scans import ScanBlock
+from lineloom_core.mapping.facts.scan_name import ScanName
 
 
 class _Site:
@@ -57,10 +58,13 @@ class _Site:
                 for i in self.ids()
             ),
             keyframes=tuple(
-                KeyframeView(i, "a", "c1", "0", i, 0.0, Pose(x(), 0.0, 0.0)) for i in self.ids()
+                KeyframeView(f"k{i}", "a", "c1", "0", i, 0.0, Pose(x(), 0.0, 0.0))
+                for i in self.ids()
             ),
             constraints=tuple(self.constraint(f"s{i}") for i in self.ids()),
-            places=tuple(PlaceView(i, "a", i, (i, i + 1)) for i in self.ids()),
+            places=tuple(
+                PlaceView(f"p{i}", "a", f"k{i}", (f"k{i}", f"k{i + 1}")) for i in self.ids()
+            ),
         )
 
     def robot(self, name: str) -> RobotView:
@@ -71,8 +75,11 @@ class _Site:
     def constraint(self, name: str) -> ConstraintView:
         information = np.full((3, 3), self.number())
         checks, history = {"conflict": self.number()}, (StateChange(1, "accepted", "so"),)
-        known = ("loop", "accepted", 0, 1, Pose(1.0, 0.0, 0.0), information, "so", checks)
-        return ConstraintView(name, *known, residual=self.number(), history=history)  # type: ignore[arg-type]
+        T, (a, b) = Pose(1.0, 0.0, 0.0), (ScanName("a", "0", i) for i in range(2))
+        return ConstraintView(
+            name, "loop", "accepted", "k0", "k1", T, information, "so", "near", a, b, checks,
+            residual=self.number(), history=history,
+        )  # fmt: skip
 
     def trajectories(self, names: list[str]) -> Trajectories:
         ways = {n: Way(int(self.rng.integers(3)), (), Pose.identity()) for n in names}

@@ -19,6 +19,7 @@ from lineloom_core.mapping.answers.site_view import (
     TrajectoryView,
 )
 from lineloom_core.mapping.config import JoinConfig, MapperConfig
+from lineloom_core.mapping.facts.scan_name import ScanName
 from lineloom_core.scan import Scan
 from lineloom_lab.evaluation.merge_bench import CaseResult, run_case, run_merge_bench
 from lineloom_lab.evaluation.merge_bench_buildings import UNDECIDABLE, building_classes
@@ -115,7 +116,7 @@ class Story:
             poses[name] = [shifts.get(name, Pose.identity()) @ p for p in found]
             ids = range(len(frames), len(frames) + len(true))
             frames += [
-                KeyframeView(k, name, component, "0", seq, 0.0, poses[name][seq])
+                KeyframeView(str(k), name, component, "0", seq, 0.0, poses[name][seq])
                 for seq, k in enumerate(ids)
             ]
             constraints += [edge(a, a + 1, "sequential") for a in ids[:-1]]
@@ -138,7 +139,8 @@ class Story:
 
 def edge(a: int, b: int, kind: str) -> ConstraintView:
     return ConstraintView(
-        f"k{a}-{b}", kind, "accepted", a, b, Pose.identity(), np.eye(3), ""  # type: ignore[arg-type]
+        f"k{a}-{b}", kind, "accepted", str(a), str(b), Pose.identity(), np.eye(3), "",  # type: ignore[arg-type]
+        "recognition", ScanName("a", "0", a), ScanName("b", "0", b),
     )  # fmt: skip
 
 

@@ -33,8 +33,8 @@ class Constraint(Answer):
     id: str
     kind: ConstraintKind
     state: ConstraintState
-    keyframe_a: int
-    keyframe_b: int
+    keyframe_a: str
+    keyframe_b: str
     robot_a: str | None = None
     robot_b: str | None = None
     T_a_b: PoseAnswer

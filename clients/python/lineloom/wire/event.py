@@ -84,8 +84,8 @@ class ConstraintEvent(BaseEvent):
     kind: ConstraintKind
     state: ConstraintState | Literal["removed"]
     was: ConstraintState | None = None
-    keyframe_a: int
-    keyframe_b: int
+    keyframe_a: str
+    keyframe_b: str
     robot_a: str | None = None
     robot_b: str | None = None
     reason: str

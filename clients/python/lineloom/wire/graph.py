@@ -13,10 +13,10 @@ class Submap(Answer):
     anchor: the keyframe whose frame is the submap's. keyframes: in driving order.
     """
 
-    id: int
+    id: str
     robot: str
-    anchor: int
-    keyframes: list[int]
+    anchor: str
+    keyframes: list[str]
 
 
 class GraphSummary(Answer):
@@ -30,7 +30,7 @@ class GraphSummary(Answer):
 class GraphNode(Answer):
     """A keyframe: pose of the laser in its component's map frame."""
 
-    id: int
+    id: str
     robot: str
     component: str
     session: str
@@ -44,8 +44,8 @@ class GraphNode(Answer):
 class GraphEdge(Answer):
     """A constraint: T_source_target and its information (x, y, theta in the target's axes)."""
 
-    source: int
-    target: int
+    source: str
+    target: str
     key: str
     kind: str
     state: str

@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 
 from lineloom_core.codec import storable
 from lineloom_core.geometry import Pose
+from lineloom_core.mapping.belief.claim import Claim, Origin
 from lineloom_core.mapping.belief.constraint_state import (
     ConstraintKind,
     ConstraintState,
     StateChange,
 )
 from lineloom_core.mapping.facts.robot_state import RobotState
+from lineloom_core.mapping.facts.scan_name import ScanName
 from lineloom_core.mapping.facts.unplaced_scan import UnplacedScan
 
 
@@ -105,7 +107,7 @@ class MapLine:
 class KeyframeView:
     """A node of the pose graph: pose of the laser in the component's map frame."""
 
-    id: int
+    id: str
     robot: str
     component: str
     session: str
@@ -122,10 +124,10 @@ class PlaceView:
     anchor: the keyframe whose frame is its own. keyframes: all of them, in driving order.
     """
 
-    id: int
+    id: str
     robot: str
-    anchor: int
-    keyframes: tuple[int, ...]
+    anchor: str
+    keyframes: tuple[str, ...]
 
 
 @storable("constraint-view")
@@ -136,21 +138,30 @@ class ConstraintView:
     T_a_b: pose of keyframe b in the frame of keyframe a. information: 3x3 in the tangent space of
     T_a_b at b (order x, y, theta, in the axes of b, as gtsam's BetweenFactorPose2 takes it).
     checks: figure per check, e.g. {"conflict": 0.03, "overlap_m": 11.2}. residual: whitened norm
-    in the graph now (None where the constraint is not in the graph).
+    in the graph now (None where the constraint is not in the graph). origin, scan_a, scan_b: what
+    it rests on, whatever becomes of its keyframes in another replay.
     """
 
     id: str
     kind: ConstraintKind
     state: ConstraintState
-    keyframe_a: int
-    keyframe_b: int
+    keyframe_a: str
+    keyframe_b: str
     T_a_b: Pose
     information: NDArray[np.float64]
     reason: str
+    origin: Origin
+    scan_a: ScanName
+    scan_b: ScanName
     checks: dict[str, float] = field(default_factory=dict)
     consistency_set: tuple[str, ...] = ()
     residual: float | None = None
     history: tuple[StateChange, ...] = ()
+
+    @property
+    def claim(self) -> Claim:
+        """What it says, for a verdict that outlives it."""
+        return Claim(self.id, self.kind, self.origin, self.scan_a, self.scan_b, self.T_a_b)
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from lineloom_core.mapping.answers.site_view import (
     SiteView,
 )
 from lineloom_core.mapping.answers.trajectories import Trajectories, Way, Whereabouts
+from lineloom_core.mapping.belief.constraint import Constraint
 from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.facts.robot_record import RobotRecord
 
@@ -126,7 +127,7 @@ def _whereabouts(site: SiteMap, component_of: dict[int, str]) -> Whereabouts:
 def _keyframes(site: SiteMap, component_of: dict[int, str]) -> tuple[KeyframeView, ...]:
     return tuple(
         KeyframeView(
-            id=k.id,
+            id=k.name,
             robot=k.robot,
             component=component_of[k.id],
             session=k.scan.session,
@@ -141,10 +142,10 @@ def _keyframes(site: SiteMap, component_of: dict[int, str]) -> tuple[KeyframeVie
 def _places(site: SiteMap) -> tuple[PlaceView, ...]:
     return tuple(
         PlaceView(
-            id=place.id,
+            id=site.id_of("place", place.id),
             robot=site.keyframes[place.anchor].robot,
-            anchor=place.anchor,
-            keyframes=place.keyframes,
+            anchor=site.keyframes[place.anchor].name,
+            keyframes=tuple(site.keyframes[k].name for k in place.keyframes),
         )
         for place in site.places.values()
     )
@@ -154,20 +155,25 @@ def _constraints(site: SiteMap) -> tuple[ConstraintView, ...]:
     """All constraints; what is barred is not in the map, but must be there to be restored."""
     residuals = site.graph.residuals()
     known = {**site.constraints, **{c.id: c for c in site.verdicts.all_barred()}}
-    return tuple(
-        ConstraintView(
-            id=c.id,
-            kind=c.kind,
-            state=c.state,
-            keyframe_a=c.keyframe_a,
-            keyframe_b=c.keyframe_b,
-            T_a_b=c.T_a_b,
-            information=c.information,
-            reason=c.reason,
-            checks=dict(c.checks),
-            consistency_set=c.consistency_set,
-            residual=residuals.get(c.id),
-            history=c.history,
-        )
-        for c in known.values()
+    return tuple(_constraint(site, c, residuals.get(c.id)) for c in known.values())
+
+
+def _constraint(site: SiteMap, c: Constraint, residual: float | None) -> ConstraintView:
+    a, b = site.keyframes[c.keyframe_a], site.keyframes[c.keyframe_b]
+    return ConstraintView(
+        id=c.id,
+        kind=c.kind,
+        state=c.state,
+        keyframe_a=a.name,
+        keyframe_b=b.name,
+        T_a_b=c.T_a_b,
+        information=c.information,
+        reason=c.reason,
+        origin=c.origin,
+        scan_a=a.scan_name,
+        scan_b=b.scan_name,
+        checks=dict(c.checks),
+        consistency_set=c.consistency_set,
+        residual=residual,
+        history=c.history,
     )

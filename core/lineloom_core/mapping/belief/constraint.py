@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from lineloom_core.codec import storable
 from lineloom_core.geometry import Pose
 from lineloom_core.graph import Edge
+from lineloom_core.mapping.belief.claim import Claim, Origin
 from lineloom_core.mapping.belief.constraint_state import (
     ConstraintKind,
     ConstraintState,
@@ -26,10 +27,10 @@ CONSTRAINT_FLOOR = np.diag([0.05**2, 0.05**2, 0.01**2])
 class Constraint:
     """T_a_b between two keyframes and its state.
 
-    id: made of what is compared (`step_id`, `near_loop_id`, `recognition_id`), so that the same
-    pair has the same name however often the history is gone through. information: 3x3 in the
-    tangent at b. place_a, place_b: the places it came from, -1 where it came from two keyframes
-    alone. evidence: metres of wall that speak for it. history: how it came to its state.
+    id: made of the scans that are compared (`ids`), so that the same pair has the same name in any
+    replay. information: 3x3 in the tangent at b. place_a, place_b: the places it came from, -1
+    where it came from two keyframes alone. evidence: metres of wall that speak for it. history: how
+    it came to its state. claim: what it stands for, where it was not measured here (`standing`).
     """
 
     id: str
@@ -46,6 +47,16 @@ class Constraint:
     place_b: int = -1
     evidence: float = 0.0
     history: tuple[StateChange, ...] = ()
+    claim: Claim | None = None
+
+    @property
+    def origin(self) -> Origin:
+        """How it came about."""
+        if self.claim is not None:
+            return self.claim.origin
+        if self.kind == "sequential":
+            return "step"
+        return "near" if self.place_a < 0 else "recognition"
 
     def moved_to(
         self,
@@ -85,21 +96,6 @@ class Constraint:
             information=self.information,
             robust=self.kind != "sequential",
         )
-
-
-def step_id(keyframe: int) -> str:
-    """Id of the step that leads to a keyframe from the one before it."""
-    return f"s{keyframe}"
-
-
-def near_loop_id(older: int, newer: int) -> str:
-    """Id of a loop between two keyframes that the graph predicted to be near each other."""
-    return f"n{older}-{newer}"
-
-
-def recognition_id(reference: int, current: int) -> str:
-    """Id of what came of recognising one place in another."""
-    return f"p{reference}-{current}"
 
 
 def turned_round(c: Constraint) -> Constraint:

@@ -42,4 +42,8 @@ def rebuild(
 
 def first_affected(constraints: tuple[Constraint, ...]) -> int:
     """The first keyframe at which it matters whether one of these is believed."""
-    return min(max(c.keyframe_a, c.keyframe_b) for c in constraints)
+    return min(
+        # What stands for something else keeps hold of both its ends: neither may be let go before.
+        (max if c.claim is None else min)(c.keyframe_a, c.keyframe_b)
+        for c in constraints
+    )

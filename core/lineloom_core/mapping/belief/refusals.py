@@ -1,4 +1,4 @@
-"""What is refused because a verdict stands against it.
+"""What is refused because a verdict stands against it, and what is kept because one stands for it.
 
 An operator who retracts a meeting of two robots means the meeting, not the one pair of places:
 everything that would put the two maps together in the same way is refused with it.
@@ -6,21 +6,16 @@ everything that would put the two maps together in the same way is refused with 
 
 from __future__ import annotations
 
-import numpy as np
-
-from lineloom_core.graph import CHI2_99, cycle_errors
-from lineloom_core.mapping.belief.constraint import CONSTRAINT_FLOOR, Constraint, turned_round
+from lineloom_core.mapping.belief.constraint import Constraint
+from lineloom_core.mapping.belief.sameness import is_meant, says_the_same
 from lineloom_core.mapping.belief.site_map import SiteMap
-
-_SAYS_THE_SAME = 2.0 * CHI2_99
-"""Squared cycle error up to which two recognitions tell one story; generous, as a verdict is."""
 
 
 def refuse_barred(site: SiteMap, candidates: list[Constraint]) -> list[Constraint]:
     """Reject those candidates that say the same as one that is barred; return the others."""
     free = []
     for c in candidates:
-        barred = _says_the_same_as(site, c)
+        barred = next((b for b in _recognitions(site) if says_the_same(site, b, c)), None)
         if barred is None:
             free.append(c)
             continue
@@ -32,30 +27,17 @@ def refuse_barred(site: SiteMap, candidates: list[Constraint]) -> list[Constrain
     return free
 
 
-def _says_the_same_as(site: SiteMap, c: Constraint) -> Constraint | None:
-    for barred in site.verdicts.all_barred():
-        if barred.place_a < 0 or any(
-            not site.knows(k) for k in (barred.keyframe_a, barred.keyframe_b)
-        ):
-            continue
-        for other in (barred, turned_round(barred)):
-            if (
-                site.same_component(other.keyframe_a, c.keyframe_a)
-                and site.same_component(other.keyframe_b, c.keyframe_b)
-                and _cycle_error(site, other, c) < _SAYS_THE_SAME
-            ):
-                return barred
-    return None
+def is_barred(site: SiteMap, found: Constraint) -> bool:
+    """Whether an operator has retracted what has been found, under whatever id."""
+    return any(is_meant(site, r, found) for r in site.verdicts.retracted.values())
 
 
-def _cycle_error(site: SiteMap, c: Constraint, o: Constraint) -> float:
-    pair = (c, o)
-    d2 = cycle_errors(
-        np.array([site.pose(k.keyframe_a).to_array() for k in pair]),
-        np.array([site.pose(k.keyframe_b).to_array() for k in pair]),
-        np.array([k.T_a_b.to_array() for k in pair]),
-        np.broadcast_to(CONSTRAINT_FLOOR, (2, 3, 3)),
-        lambda i, j: site.drift(pair[i].keyframe_a, pair[j].keyframe_a),
-        lambda i, j: site.drift(pair[i].keyframe_b, pair[j].keyframe_b),
+def is_approved(site: SiteMap, constraint: Constraint) -> bool:
+    """Whether an operator has restored a constraint, so that it is not withdrawn again."""
+    return constraint.id in site.verdicts.approved or any(
+        is_meant(site, a, constraint) for a in site.verdicts.vouched.values()
     )
-    return float(d2[0, 1])
+
+
+def _recognitions(site: SiteMap) -> list[Constraint]:
+    return [c for c in site.verdicts.all_barred() if c.origin == "recognition"]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from lineloom_core.codec import storable
 from lineloom_core.geometry import Pose
 from lineloom_core.graph import PoseGraph, settle
-from lineloom_core.mapping.belief.constraint import Constraint, step_id
+from lineloom_core.mapping.belief.constraint import Constraint
 from lineloom_core.mapping.belief.graph_drift import GraphDrift
 from lineloom_core.mapping.belief.memory import Memory
 from lineloom_core.mapping.belief.place_making import make_place
@@ -25,6 +25,7 @@ from lineloom_core.mapping.belief.track import Track
 from lineloom_core.mapping.belief.verdicts import Verdicts
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.facts.drift import way_drift
+from lineloom_core.mapping.facts.ids import Named, id_of
 from lineloom_core.mapping.facts.keyframe import Keyframe, Step
 from lineloom_core.places import Place
 
@@ -101,7 +102,7 @@ class SiteMap:
         self.keyframes[keyframe.id] = keyframe
         self.now = keyframe.version
         step = keyframe.step
-        if step is None or self.verdicts.barred(step_id(keyframe.id)):
+        if step is None or self._is_cut(keyframe, step):
             name = str(keyframe.track) if step is None else f"{keyframe.track}.{keyframe.id}"
             track = self.tracks[name] = Track(name, keyframe.robot)
             self._latest_track[keyframe.robot] = track
@@ -114,9 +115,19 @@ class SiteMap:
         track.append(keyframe.id, T, step.drift)
         self._track_of[keyframe.id] = track
         self.graph.add_node(keyframe.id, self.pose(step.previous) @ T)
-        constraint = _tracked(keyframe.id, step)
+        constraint = self._tracked(keyframe.id, step)
         self.add_constraint(constraint)
         return constraint
+
+    def _is_cut(self, keyframe: Keyframe, step: Step) -> bool:
+        before = self.keyframes[step.previous].scan_name
+        return self.verdicts.cuts(self.id_of("step", keyframe.id), before, keyframe.scan_name)
+
+    def step(self, keyframe: int) -> Constraint | None:
+        """The step to a keyframe; None where a track begins, or the keyframe was let go."""
+        if keyframe not in self.keyframes:
+            return None
+        return self.constraints.get(self.id_of("step", keyframe))
 
     def add_place(self, members: tuple[int, ...]) -> Place:
         """Add the place that these keyframes of one track show."""
@@ -154,8 +165,12 @@ class SiteMap:
         return self.graph.component_root(self.resting.on(keyframe)[0])
 
     def component_id(self, keyframe: int) -> str:
-        """Stable id of the keyframe's component: that of its oldest track."""
-        return f"c{self._track_of[self.component_root(keyframe)].id}"
+        """Id of the keyframe's component: that of its oldest track."""
+        return self.id_of("component", self.component_root(keyframe))
+
+    def id_of(self, what: Named, *keyframes: int) -> str:
+        """Id of what rests on these keyframes, which the map has not let go."""
+        return id_of(what, *(self.keyframes[k].scan_name for k in keyframes))
 
     def same_component(self, a: int, b: int) -> bool:
         """Whether the relative pose of two keyframes is known."""
@@ -248,7 +263,7 @@ class SiteMap:
             del self.keyframes[k]
         for keyframe, step in over:
             self.keyframes[keyframe] = replace(self.keyframes[keyframe], step=step, joined=True)
-            self.add_constraint(_tracked(keyframe, step))
+            self.add_constraint(self._tracked(keyframe, step))
 
     def _lay_to_rest(self, run: Sequence[int]) -> tuple[int, Step] | None:
         """Fix a run to what stays; return what comes after it and the one step over the run."""
@@ -276,16 +291,15 @@ class SiteMap:
     def _has_places(self, c: Constraint) -> bool:
         return c.place_a in self.places and c.place_b in self.places
 
-
-def _tracked(keyframe: int, step: Step) -> Constraint:
-    return Constraint(
-        id=step_id(keyframe),
-        kind="sequential",
-        state="accepted",
-        keyframe_a=step.previous,
-        keyframe_b=keyframe,
-        T_a_b=step.T_previous_this,
-        information=step.information,
-        reason="tracked from scan to scan",
-        checks=step.checks,
-    )
+    def _tracked(self, keyframe: int, step: Step) -> Constraint:
+        return Constraint(
+            id=self.id_of("step", keyframe),
+            kind="sequential",
+            state="accepted",
+            keyframe_a=step.previous,
+            keyframe_b=keyframe,
+            T_a_b=step.T_previous_this,
+            information=step.information,
+            reason="tracked from scan to scan",
+            checks=step.checks,
+        )

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 from lineloom_core.codec import storable
 from lineloom_core.mapping.belief.constraint import Constraint
+from lineloom_core.mapping.facts.scan_name import ScanName
 
 
 @storable("verdicts")
@@ -19,15 +20,26 @@ class Verdicts:
     """retracted: by an operator, withdrawn: by the mapper; both by constraint id, as they were.
 
     approved: restored by an operator after they had been withdrawn, so never withdrawn again.
+    vouched: restored though nothing was withdrawn yet that they mean (`sameness`), by id.
     """
 
     retracted: Mapping[str, Constraint] = field(default_factory=dict)
     withdrawn: Mapping[str, Constraint] = field(default_factory=dict)
     approved: frozenset[str] = frozenset()
+    vouched: Mapping[str, Constraint] = field(default_factory=dict)
 
     def barred(self, constraint_id: str) -> Constraint | None:
         """The retracted or withdrawn constraint of this id, if there is one."""
         return self.retracted.get(constraint_id) or self.withdrawn.get(constraint_id)
+
+    def cuts(self, step: str, before: ScanName, after: ScanName) -> bool:
+        """Whether the step of this id, from one scan to another, is barred."""
+        return self.barred(step) is not None or any(
+            c.claim is not None
+            and c.origin == "step"
+            and c.claim.scan_b.lies_between(before, after)
+            for c in self.retracted.values()
+        )
 
     def all_barred(self) -> tuple[Constraint, ...]:
         """Everything that is not to be believed, oldest first."""
@@ -40,6 +52,7 @@ class Verdicts:
             retracted={**self.retracted, constraint.id: constraint},
             withdrawn=_without(self.withdrawn, constraint.id),
             approved=self.approved - {constraint.id},
+            vouched=_without(self.vouched, constraint.id),
         )
 
     def withdraw(self, constraints: tuple[Constraint, ...]) -> Verdicts:
@@ -56,6 +69,12 @@ class Verdicts:
             approved=self.approved | overruled,
         )
 
+    def vouch(self, constraint: Constraint) -> Verdicts:
+        """This one, or what it stands for, is not to be withdrawn, says an operator."""
+        if constraint.claim is None:
+            return replace(self, approved=self.approved | {constraint.id})
+        return replace(self, vouched={**self.vouched, constraint.id: constraint})
+
     def operators_only(self) -> Verdicts:
         """The mapper's own verdicts left aside: they follow from the history anew."""
         return replace(self, withdrawn={})
@@ -71,15 +90,12 @@ class Verdicts:
 
     def without(self, keyframes: set[int]) -> Verdicts:
         """The same where these keyframes are forgotten."""
-
-        def stays(c: Constraint) -> bool:
-            return c.keyframe_a not in keyframes and c.keyframe_b not in keyframes
-
-        return Verdicts(
-            {i: c for i, c in self.retracted.items() if stays(c)},
-            {i: c for i, c in self.withdrawn.items() if stays(c)},
-            self.approved,
+        kept = (
+            {i: c for i, c in group.items() if not {c.keyframe_a, c.keyframe_b} & keyframes}
+            for group in (self.retracted, self.withdrawn, self.vouched)
         )
+        retracted, withdrawn, vouched = kept
+        return Verdicts(retracted, withdrawn, self.approved, vouched)
 
 
 def _without(items: Mapping[str, Constraint], key: str) -> dict[str, Constraint]:

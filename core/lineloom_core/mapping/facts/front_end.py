@@ -163,6 +163,7 @@ def _place(
         version=version,
         extraction=config.extraction,
         trusted=not record.distrusted,
+        repeat=record.name_next(scan).repeat,
     )
     history.add(keyframe)
     record.last_keyframe = keyframe.id

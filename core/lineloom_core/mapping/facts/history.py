@@ -171,6 +171,12 @@ class History:
         nearest = sorted(range(len(chain)), key=lambda i: (abs(i - where), i))
         return [self[int(chain[i])] for i in nearest if abs(i - where) <= reach]
 
+    def before(self, keyframe: Keyframe) -> Iterator[Keyframe]:
+        """The keyframes before this one on its track, the latest first."""
+        chain = self._table.on_track(keyframe.id)
+        for k in reversed(chain[chain < keyframe.id].tolist()):
+            yield self[k]
+
     def _as_is(self, fact: Keyframe) -> Keyframe:
         """A keyframe out of a chapter as it is believed today: the one object, as long as any."""
         held = self._held.get(fact.id)

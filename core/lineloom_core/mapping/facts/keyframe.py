@@ -13,6 +13,8 @@ from lineloom_core.features import ExtractionConfig, ScanFeatures, extract_featu
 from lineloom_core.features._kernels import VAR_OFFSET
 from lineloom_core.geometry import Pose
 from lineloom_core.lately import UsedLately
+from lineloom_core.mapping.facts.ids import id_of
+from lineloom_core.mapping.facts.scan_name import ScanName
 from lineloom_core.matching.local_map import Cloud
 from lineloom_core.scan import Scan
 
@@ -67,7 +69,7 @@ class Keyframe:
     break that it belongs to. T_track_laser: where the tracker put it; the graph knows better.
     step: None for the first of a track. version: number of the log entry that brought it.
     trusted: False where its lidar's geometry is certainly wrong: no place is made of it.
-    joined: the step leads over keyframes that the map has let go.
+    joined: the step leads over keyframes that the map has let go. repeat: see `ScanName`.
     Features and cloud are functions of the scan: kept for the keyframes used last, made anew for
     the others.
     """
@@ -82,6 +84,17 @@ class Keyframe:
     extraction: ExtractionConfig = field(repr=False)
     trusted: bool = True
     joined: bool = False
+    repeat: int = 0
+
+    @cached_property
+    def scan_name(self) -> ScanName:
+        """What its scan is called in any replay."""
+        return ScanName(self.robot, self.scan.session, self.scan.seq, self.repeat)
+
+    @cached_property
+    def name(self) -> str:
+        """What it is called outside: `id` is a number of this replay alone."""
+        return id_of("keyframe", self.scan_name)
 
     @cached_property
     def segments(self) -> NDArray[np.float64]:

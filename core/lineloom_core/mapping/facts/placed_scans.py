@@ -83,6 +83,17 @@ class PlacedScans:
             self._full.append(self._last())
             self._begin()
 
+    def find(self, session: str, seq: int) -> PlacedScan | None:
+        """The placed scan of a number; None where there is none."""
+        number = self._names.get(session, -1)
+        for b in self.blocks():
+            rows = np.flatnonzero((b.session == number) & (b.seq == seq))
+            if len(rows):
+                i = int(rows[0])
+                T = Pose(*b.steps[i].tolist())
+                return PlacedScan(session, seq, float(b.stamp[i]), int(b.keyframe[i]), T)
+        return None
+
     def blocks(self) -> tuple[ScanBlock, ...]:
         """All scans; full blocks are the same objects each time."""
         return (*self._full, self._last()) if len(self._seq) else tuple(self._full)

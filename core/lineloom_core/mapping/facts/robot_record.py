@@ -8,6 +8,7 @@ from lineloom_core.codec import storable
 from lineloom_core.health import SensorDoctor
 from lineloom_core.mapping.facts.placed_scans import PlacedScan, PlacedScans
 from lineloom_core.mapping.facts.robot_state import RobotState
+from lineloom_core.mapping.facts.scan_name import ScanName
 from lineloom_core.mapping.facts.tracker import Tracker
 from lineloom_core.mapping.facts.unplaced_scan import UnplacedScan
 from lineloom_core.scan import Mount, Scan
@@ -25,6 +26,8 @@ class RobotRecord:
     """Number of the track that it is on."""
     last_keyframe: int | None = None
     """The track's latest."""
+    last_named: ScanName | None = None
+    """The latest scan of any track that became a keyframe."""
     state: RobotState = "starting"
     session: str | None = None
     sessions: dict[str, None] = field(default_factory=dict)
@@ -38,6 +41,13 @@ class RobotRecord:
     doctor: SensorDoctor = field(default_factory=SensorDoctor)
     distrusted: str = ""
     """Why nothing of its session may be joined with other maps; empty where all is well."""
+
+    def name_next(self, scan: Scan) -> ScanName:
+        """The name of the scan that becomes the next keyframe."""
+        last, number = self.last_named, (scan.session, scan.seq)
+        repeat = last.repeat + 1 if last and (last.session, last.seq) == number else 0
+        self.last_named = ScanName(self.name, *number, repeat)
+        return self.last_named
 
     def leave_unplaced(self, scan: Scan) -> None:
         """Remember a scan that fits nowhere."""

@@ -11,10 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lineloom_core.geometry import Pose
-from lineloom_core.mapping.belief.constraint import (
-    Constraint,
-    recognition_id,
-)
+from lineloom_core.mapping.belief.constraint import Constraint
 from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.facts.drift import reach
 from lineloom_core.mapping.facts.information import observed_information, turned
@@ -82,7 +79,7 @@ def _lies_apart(site: SiteMap, other: Place, place: Place) -> bool:
 
 def _try(site: SiteMap, reference: Place, current: Place) -> Constraint | None:
     """Recognise one place in another; a plausible outcome becomes a candidate."""
-    name = recognition_id(reference.id, current.id)
+    name = site.id_of("recognition", reference.id, current.id)
     if site.verdicts.barred(name):
         return None
     found = site.memory.recognise(reference, current)

@@ -14,7 +14,8 @@ import itertools
 
 import numpy as np
 
-from lineloom_core.mapping.belief.constraint import Constraint, step_id
+from lineloom_core.mapping.belief.constraint import Constraint
+from lineloom_core.mapping.belief.refusals import is_approved
 from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.merging.jumps import jump
 from lineloom_core.mapping.merging.overlap import count_steady_nearby, usual_missing
@@ -85,11 +86,11 @@ def _slip(
     if track.wrong_since < config.wrong_in_a_row:
         return None
     steps = [
-        site.constraints[step_id(k)]
+        step
         for k in track.kept
         if track.right_until < k <= place.id
-        and step_id(k) in site.constraints
-        and step_id(k) not in site.verdicts.approved
+        and (step := site.step(k)) is not None
+        and not is_approved(site, step)
     ]
     if not steps:
         return None
@@ -146,7 +147,7 @@ def _weakest_meeting(site: SiteMap, track_a: str, track_b: str) -> list[Constrai
         return []
     way = nx.shortest_path(links, track_a, track_b)
     on_the_way = {links.edges[a, b]["meeting"]: None for a, b in itertools.pairwise(way)}
-    doubtful = [m for m in on_the_way if not site.verdicts.approved & set(m)]
+    doubtful = [m for m in on_the_way if not any(is_approved(site, c) for c in meetings[m])]
     if not doubtful:
         return []
     return meetings[min(doubtful, key=lambda m: (sum(c.evidence for c in meetings[m]), m))]
@@ -165,6 +166,6 @@ def _strained(site: SiteMap, place: Place) -> tuple[Constraint, ...]:
         for edge, m, rad in edges
         if edge.kind == "loop"
         and (m > config.most_strain or rad > config.most_turn)  # as `DOUBTED`, for all loops fast
-        and edge.id not in site.verdicts.approved
         and site.component_root(edge.node_a) == root
+        and not is_approved(site, site.constraints[edge.id])
     )

@@ -14,8 +14,9 @@ from __future__ import annotations
 
 import math
 
-from lineloom_core.mapping.belief.constraint import Constraint, step_id
+from lineloom_core.mapping.belief.constraint import Constraint
 from lineloom_core.mapping.belief.place_making import make_place
+from lineloom_core.mapping.belief.refusals import is_approved
 from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.belief.track import Track
 from lineloom_core.mapping.merging.withdrawal import is_doubted, withdrawn
@@ -36,7 +37,7 @@ def jump(site: SiteMap, place: Place) -> Constraint | None:
             continue
         share = math.sqrt(math.prod(missing_share(*way) for way in ways))
         if is_doubted(site, {"jump_missing": share}):
-            step = site.constraints[step_id(track.keyframes[at])]
+            step = site.constraints[site.id_of("step", track.keyframes[at])]
             return withdrawn(site, step, {"jump_missing": share})
     return None
 
@@ -61,8 +62,8 @@ def _suspects(site: SiteMap, track: Track, place: Place) -> list[int]:
 
 def _conflict(site: SiteMap, keyframe: int) -> float:
     """Share of a keyframe's scan that lies in what the one before saw as free, by its step."""
-    step = site.constraints.get(step_id(keyframe))
-    if step is None or step.id in site.verdicts.approved:
+    step = site.step(keyframe)
+    if step is None or is_approved(site, step):
         return 0.0
     return step.checks.get("conflict_share", 0.0)
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from lineloom_core.checks import NEAR_LOOP
 from lineloom_core.geometry import Pose, angle_difference
-from lineloom_core.mapping.belief.constraint import Constraint, near_loop_id
+from lineloom_core.mapping.belief.constraint import Constraint
+from lineloom_core.mapping.belief.refusals import is_barred
 from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.facts.information import observed_information, turned
 from lineloom_core.mapping.facts.keyframe import Keyframe
@@ -20,11 +21,12 @@ from lineloom_core.matching.local_map import Cloud, LocalMap
 def close_near_loop(site: SiteMap, keyframe: int) -> Constraint | None:
     """Try to tie a keyframe to an older part of its component; return the accepted constraint."""
     older = _partner(site, keyframe)
-    if older is None or site.verdicts.barred(near_loop_id(older, keyframe)):
+    if older is None or site.verdicts.barred(site.id_of("near", older, keyframe)):
         return None
     found = _register(site, older, keyframe)
-    if found is not None:
-        site.add_constraint(found)
+    if found is None or is_barred(site, found):
+        return None
+    site.add_constraint(found)
     return found
 
 
@@ -69,7 +71,7 @@ def _register(site: SiteMap, older: int, newer: int) -> Constraint | None:
     if NEAR_LOOP.against(config, checks):
         return None
     return Constraint(
-        id=near_loop_id(older, newer),
+        id=site.id_of("near", older, newer),
         kind="loop",
         state="accepted",
         keyframe_a=older,

@@ -6,7 +6,7 @@ const MOST_VERSIONS = 300;
 
 /**
  * @typedef {import("./site_state.js").SiteState} SiteState
- * @typedef {{kind: "rebuilt", keyframe: number} | {kind: "received", state: SiteState}} Moment
+ * @typedef {{kind: "rebuilt", known: number} | {kind: "received", state: SiteState}} Moment
  */
 
 /**
@@ -45,7 +45,7 @@ export class History {
     if (this._moments) return this._moments;
     const first = this._received[0];
     /** @type {Moment[]} */
-    const before = first ? rebuildSteps(first).map((keyframe) => ({ kind: "rebuilt", keyframe })) : [];
+    const before = first ? rebuildSteps(first).map((known) => ({ kind: "rebuilt", known })) : [];
     const received = this._received.map(
       (state) => /** @type {Moment} */ ({ kind: "received", state }),
     );
@@ -56,7 +56,7 @@ export class History {
   /** Return what to show for a moment. @param {Moment} moment @returns {SiteState} */
   stateAt(moment) {
     if (moment.kind === "received") return moment.state;
-    return rebuilt(/** @type {SiteState} */ (this.latest), moment.keyframe);
+    return rebuilt(/** @type {SiteState} */ (this.latest), moment.known);
   }
 
   /** Leave out every second version of the older half while there is too much. */

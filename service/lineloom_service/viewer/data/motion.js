@@ -14,7 +14,7 @@ import { compose, inverse } from "../geometry/pose.js";
  * @param {SiteState} before @param {SiteState} after @returns {Move[]}
  */
 export function componentMoves(before, after) {
-  /** @type {Map<string, {from: string, to: string, shared: number[]}>} */
+  /** @type {Map<string, {from: string, to: string, shared: string[]}>} */
   const pairs = new Map();
   for (const node of before.keyframes.values()) {
     const now = after.keyframes.get(node.id);

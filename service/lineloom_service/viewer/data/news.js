@@ -1,3 +1,5 @@
+import { brief } from "./brief.js";
+
 /**
  * Return what happened between two states, in plain words: components that joined or parted,
  * constraints that an operator or the service has withdrawn, robots that lost their way.
@@ -21,7 +23,7 @@ function joined(before, after) {
     .filter(({ id }) => after.survivorOf(id) !== id && before.survivorOf(id) === id)
     .map(({ id, robots }) => {
       const survivor = after.survivorOf(id);
-      return `Component ${id} (${robots.join(", ")}) joined ${survivor}`;
+      return `Component ${brief(id)} (${robots.join(", ")}) joined ${brief(survivor)}`;
     });
 }
 
@@ -29,7 +31,7 @@ function joined(before, after) {
 function parted(before, after) {
   return after.components
     .filter(({ id }) => before.survivorOf(id) !== id)
-    .map(({ id, robots }) => `Component ${id} (${robots.join(", ")}) parted from ${before.survivorOf(id)}`);
+    .map(({ id, robots }) => `Component ${brief(id)} (${robots.join(", ")}) parted from ${brief(before.survivorOf(id))}`);
 }
 
 /** @param {import("./site_state.js").SiteState} before @param {import("./site_state.js").SiteState} after */

@@ -87,7 +87,7 @@ function componentsOf(state) {
     component.bounds = component.bounds.union(bounds);
     found.set(id, component);
   }
-  return [...found.values()].sort((a, b) => b.keyframes - a.keyframes || (a.id < b.id ? -1 : 1));
+  return [...found.values()].sort((a, b) => b.keyframes - a.keyframes); // of equal ones the older first
 }
 
 /** @param {SiteState} state @param {string} id @returns {Component} */
@@ -142,7 +142,7 @@ function pathsOf(graph) {
   }
   /** @type {Map<string, Keyframe[][]>} */
   const pieces = new Map();
-  for (const node of [...graph.nodes].sort((a, b) => a.id - b.id)) {
+  for (const node of graph.nodes) {
     const ofRobot = pieces.get(node.robot) ?? [];
     pieces.set(node.robot, ofRobot);
     const piece = ofRobot[ofRobot.length - 1];

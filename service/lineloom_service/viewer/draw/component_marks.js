@@ -1,5 +1,6 @@
 import { apply } from "../geometry/pose.js";
 import { drawLabel } from "./label.js";
+import { brief } from "../data/brief.js";
 
 /**
  * Frame and name each component while there are several: nothing is known of how they lie to each
@@ -30,7 +31,7 @@ export function drawComponents(context, camera, { state, placement, palette }, s
     context.setLineDash([3, 4]);
     context.stroke();
     context.setLineDash([]);
-    const name = `${component.id} · ${component.robots.join(", ")}`;
+    const name = `${brief(component.id)} · ${component.robots.join(", ")}`;
     drawLabel(context, name, points[0].x + 2, points[0].y - 7, palette.ink.muted, palette.ink.paper);
   }
 }

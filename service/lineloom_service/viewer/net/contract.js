@@ -21,11 +21,11 @@
  * @typedef {{site: string, version: number, components: {id: string, robots: string[]}[],
  *   lines: LineAnswer[]}} MapAnswer
  *
- * @typedef {{id: number, robot: string, component: string, session: string, seq: number,
+ * @typedef {{id: string, robot: string, component: string, session: string, seq: number,
  *   stamp: number, x: number, y: number, theta: number}} GraphNode
- * @typedef {{source: number, target: number, key: string, kind: string, state: string,
+ * @typedef {{source: string, target: string, key: string, kind: string, state: string,
  *   residual: number|null}} GraphEdge
- * @typedef {{id: number, robot: string, anchor: number, keyframes: number[]}} Submap
+ * @typedef {{id: string, robot: string, anchor: string, keyframes: string[]}} Submap
  * @typedef {{graph: {site: string, version: number, submaps?: Submap[]}, nodes: GraphNode[],
  *   edges: GraphEdge[]}} GraphAnswer
  *
@@ -35,8 +35,8 @@
  *   unit?: string}} Limit
  * @typedef {{reference: number[], current: number[], overlap: number, distance: number,
  *   angle: number}} MatchedPair
- * @typedef {{id: string, kind: ConstraintKind, state: ConstraintState, keyframe_a: number,
- *   keyframe_b: number, robot_a: string|null, robot_b: string|null, T_a_b: Pose, reason: string,
+ * @typedef {{id: string, kind: ConstraintKind, state: ConstraintState, keyframe_a: string,
+ *   keyframe_b: string, robot_a: string|null, robot_b: string|null, T_a_b: Pose, reason: string,
  *   checks: Object<string, number|null>, consistency_set: string[], residual: number|null,
  *   history?: {version: number, state: string, reason: string}[],
  *   limits?: Object<string, Limit>|null, matched?: MatchedPair[]|null, conflicts?: number[][]|null,

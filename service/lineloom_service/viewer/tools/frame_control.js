@@ -2,6 +2,7 @@ import { framesOf } from "../data/frames.js";
 import { DifferenceMarks } from "../draw/difference_marks.js";
 import { ProblemError } from "../net/api.js";
 import { FloorPlan } from "../net/floor_plan.js";
+import { brief } from "../data/brief.js";
 
 /**
  * Shows the map in the coordinates that the reader has chosen, for a site until the tab is closed.
@@ -80,7 +81,7 @@ export class FrameControl {
   _tell(plan) {
     if (this._plan) return;
     for (const { component, T_plan_map, reason } of plan.components) {
-      if (!T_plan_map) this._app.notices.say(`${component} has no place in the plan: ${reason}`);
+      if (!T_plan_map) this._app.notices.say(`${brief(component)} has no place in the plan: ${reason}`);
     }
   }
 

@@ -1,6 +1,7 @@
 import { h } from "./dom.js";
 import { card, facts, part, swatch } from "./card.js";
 import { count, metres } from "./format.js";
+import { brief } from "../data/brief.js";
 
 /**
  * A part of the map whose inner geometry is known.
@@ -26,7 +27,7 @@ export function componentCard(component, { state, palette, onClose, onPick, onGo
   );
   const several = state.components.length > 1;
   return card(
-    `Component ${component.id}`,
+    `Component ${brief(component.id)}`,
     null,
     onClose,
     several &&
@@ -36,10 +37,11 @@ export function componentCard(component, { state, palette, onClose, onPick, onGo
         "How this part of the map lies to the others is not known yet. They are drawn side by side until the evidence is enough.",
       ),
     facts([
+      ["Id", component.id],
       ["Walls", `${count(lines.length)}, ${metres(wall)} in all`],
       ["Keyframes", count(component.keyframes)],
       ["Extent", `${component.bounds.width.toFixed(1)} × ${component.bounds.height.toFixed(1)} m`],
-      ["Has absorbed", absorbed.join(", ") || null],
+      ["Has absorbed", absorbed.map(brief).join(", ") || null],
     ]),
     part("Robots", h("ul", { className: "rows" }, ...robots)),
     h(

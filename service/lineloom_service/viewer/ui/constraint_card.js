@@ -4,6 +4,7 @@ import { checkTable } from "./check_table.js";
 import { evidenceDrawing } from "./evidence_drawing.js";
 import { count, degrees, figure, metres, percent } from "./format.js";
 import { whatIfResult } from "./what_if_result.js";
+import { brief } from "../data/brief.js";
 
 /**
  * A constraint, its evidence, and what can be done about it.
@@ -15,7 +16,7 @@ export function constraintCard(constraint, context) {
   const { T_a_b, checks, history } = constraint;
   const limits = constraint.limits ?? {};
   return card(
-    `${constraint.kind === "loop" ? "Loop" : "Rendezvous"} ${constraint.id}`,
+    `${constraint.kind === "loop" ? "Loop" : "Rendezvous"} ${brief(constraint.id)}`,
     tag(constraint.state),
     context.onClose,
     h("p", { className: "reason", "data-state": constraint.state }, sentence(constraint.reason)),
@@ -27,8 +28,9 @@ export function constraintCard(constraint, context) {
     part(
       "Between",
       facts([
-        ["a", `${constraint.robot_a ?? "?"}, keyframe ${constraint.keyframe_a}`],
-        ["b", `${constraint.robot_b ?? "?"}, keyframe ${constraint.keyframe_b}`],
+        ["Id", constraint.id],
+        ["a", `${constraint.robot_a ?? "?"}, keyframe ${brief(constraint.keyframe_a)}`],
+        ["b", `${constraint.robot_b ?? "?"}, keyframe ${brief(constraint.keyframe_b)}`],
         ["b seen from a", `${metres(T_a_b.x)}, ${metres(T_a_b.y)}, ${degrees(T_a_b.theta)}`],
         ["Residual in the graph", constraint.residual === null ? null : `${figure(constraint.residual)} σ`],
       ]),
@@ -116,7 +118,7 @@ function agreeing({ id, consistency_set }, { onPick, state }) {
   if (others.length === 0) return null;
   const buttons = others.map((other) =>
     state.constraints.has(other)
-      ? h("button", { onclick: () => onPick({ kind: "constraint", id: other }), "data-key": `set ${other}` }, other)
+      ? h("button", { onclick: () => onPick({ kind: "constraint", id: other }), "data-key": `set ${other}` }, brief(other))
       : h("span", {}, other),
   );
   return part("Agrees with", h("div", { className: "buttons" }, ...buttons));

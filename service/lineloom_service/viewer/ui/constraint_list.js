@@ -1,6 +1,7 @@
 import { h, refill } from "./dom.js";
 import { LayerSwitches } from "./layer_switches.js";
 import { CONSTRAINT_NAMES } from "../draw/layers.js";
+import { brief } from "../data/brief.js";
 
 const MOST_ROWS = 60;
 
@@ -47,8 +48,8 @@ export class ConstraintList {
         onclick: () => this._onPick({ kind: "constraint", id }),
       },
       h("span", { className: "mark", "data-state": state, "aria-hidden": "true" }),
-      h("span", { className: "name" }, robots ?? id, h("span", { className: "hidden-text" }, `, ${state}`)),
-      h("span", { className: "end" }, kind === "loop" ? "loop" : id),
+      h("span", { className: "name" }, robots ?? brief(id), h("span", { className: "hidden-text" }, `, ${state}`)),
+      h("span", { className: "end" }, kind === "loop" ? "loop" : brief(id)),
     );
   }
 }

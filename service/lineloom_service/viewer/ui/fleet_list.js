@@ -1,6 +1,7 @@
 import { h, refill } from "./dom.js";
 import { count, plural } from "./format.js";
 import { swatch } from "./card.js";
+import { brief } from "../data/brief.js";
 
 /**
  * Components and the robots in them.
@@ -27,7 +28,7 @@ export class FleetList {
         "div",
         { className: "group" },
         this._row({ kind: "component", id: component.id }, selected, [
-          h("span", { className: "group-title" }, component.id),
+          h("span", { className: "group-title", title: component.id }, brief(component.id)),
           h("span", { className: "end" }, plural(component.keyframes, "keyframe")),
         ]),
         h(

@@ -1,6 +1,7 @@
 import { h } from "./dom.js";
 import { card, facts, part, swatch } from "./card.js";
 import { metres, plural, stamp } from "./format.js";
+import { brief } from "../data/brief.js";
 
 /**
  * Who saw a wall, and when.
@@ -30,7 +31,7 @@ export function lineCard(line, { state, palette, onClose, onPick }) {
     facts([
       ["Length", metres(length)],
       ["Position known to", `± ${metres(line.sigma)}`],
-      ["Component", line.component],
+      ["Component", brief(line.component)],
       ["From", `${line.x1.toFixed(2)}, ${line.y1.toFixed(2)}`],
       ["To", `${line.x2.toFixed(2)}, ${line.y2.toFixed(2)}`],
     ]),

@@ -2,6 +2,7 @@ import { h } from "./dom.js";
 import { card, facts, tag } from "./card.js";
 import { checkTable } from "./check_table.js";
 import { degrees, percent } from "./format.js";
+import { brief } from "../data/brief.js";
 
 /** @type {Record<string, string>} */
 const MEANING = {
@@ -30,7 +31,7 @@ export function localizeCard(localizer, { onClose }, onChoose) {
           "data-key": `hypothesis ${rank}`,
           onclick: () => onChoose(rank),
         },
-        h("span", { className: "name" }, `#${rank + 1} in ${hypothesis.component}`),
+        h("span", { className: "name" }, `#${rank + 1} in ${brief(hypothesis.component)}`),
         h("span", { className: "end" }, percent(hypothesis.score)),
       ),
     ),

@@ -2,6 +2,7 @@ import { h } from "./dom.js";
 import { card, facts, part, tag } from "./card.js";
 import { count, degrees, metres, stamp } from "./format.js";
 import { positionEllipse } from "../geometry/ellipse.js";
+import { brief } from "../data/brief.js";
 
 /**
  * How a robot is doing.
@@ -23,7 +24,7 @@ export function robotCard(robot, { onClose, onPick, onGoTo, onDownload }) {
       "Pose",
       pose
         ? facts([
-            ["Component", component],
+            ["Component", component && brief(component)],
             ["Position", `${pose.x.toFixed(2)}, ${pose.y.toFixed(2)} m`],
             ["Heading", degrees(pose.theta)],
             ["Within (95 %)", ellipse ? `${metres(ellipse.major)} × ${metres(ellipse.minor)}` : "not known"],
@@ -48,7 +49,7 @@ export function robotCard(robot, { onClose, onPick, onGoTo, onDownload }) {
       { className: "buttons" },
       h("button", { onclick: () => onGoTo({ kind: "robot", id: robot.robot }), "data-key": "go" }, "Show"),
       component !== null &&
-        h("button", { onclick: () => onPick({ kind: "component", id: component }), "data-key": "component" }, `Component ${component}`),
+        h("button", { onclick: () => onPick({ kind: "component", id: component }), "data-key": "component" }, `Component ${brief(component)}`),
       h(
         "button",
         { onclick: () => onDownload(`robots/${robot.robot}/trajectory?format=tum`, `${robot.robot}.tum`), "data-key": "tum" },

@@ -1,6 +1,6 @@
 import { h, refill } from "./dom.js";
 import { icon } from "./icon.js";
-import { count, timeOfDay } from "./format.js";
+import { plural, timeOfDay } from "./format.js";
 
 const STEP_MS = 120;
 
@@ -88,7 +88,7 @@ export class TimeBar {
     const chosen = this.chosen;
     const at = this._moments.findIndex((m) =>
       m.kind === "rebuilt"
-        ? chosen.kind === "rebuilt" && m.keyframe === chosen.keyframe
+        ? chosen.kind === "rebuilt" && m.known === chosen.known
         : chosen.kind === "received" && m.state === chosen.state,
     );
     return at < 0 ? last : at;
@@ -120,6 +120,6 @@ export class TimeBar {
       const { version, receivedAt } = moment.state;
       return `Version ${count(version)}, as received ${timeOfDay(receivedAt)}`;
     }
-    return `Rebuilt from today's map, up to keyframe ${count(moment.keyframe)}`;
+    return `Rebuilt from today's map, ${plural(moment.known, "keyframe")} in`;
   }
 }

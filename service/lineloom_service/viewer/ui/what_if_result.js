@@ -1,6 +1,7 @@
 import { h } from "./dom.js";
 import { facts } from "./card.js";
 import { degrees, metres } from "./format.js";
+import { brief } from "../data/brief.js";
 
 /**
  * Who would move by how much, and which components would part or join.
@@ -24,7 +25,7 @@ export function whatIfResult({ action, components_before, components_after, robo
 
 /** @param {import("../net/contract.js").ComponentRobots} component */
 function words({ id, robots }) {
-  return `${id} (${robots.join(", ")})`;
+  return `${brief(id)} (${robots.join(", ")})`;
 }
 
 /** @param {import("../net/contract.js").WhatIfAnswer["robots"][number]} robot */
@@ -35,6 +36,6 @@ function moves({ moved_m, turned_rad, component_before, component_after }) {
 
 /** @param {import("../net/contract.js").WhatIfAnswer["robots"][number]} robot */
 function change({ moved_m, turned_rad, component_before, component_after }) {
-  if (component_before !== component_after) return `${component_before ?? "–"} → ${component_after ?? "–"}`;
+  if (component_before !== component_after) return `${brief(component_before ?? "–")} → ${brief(component_after ?? "–")}`;
   return `${metres(moved_m ?? 0)}, ${degrees(turned_rad ?? 0)}`;
 }
