@@ -30,6 +30,7 @@ def examples(name: str) -> list[str]:
 def test_these_are_the_commands() -> None:
     assert NAMES == [
         "bench",
+        "config",
         "demo",
         "doctor",
         "experiment",
