@@ -285,7 +285,8 @@ async def test_a_question_that_nobody_can_answer_says_so(
         (constraint,) = (await a.get("/v1/sites/s/constraints?state=accepted"))["constraints"]
     async with process(url, tmp_path, engine="off") as b:
         path = f"/v1/sites/s/constraints/{constraint['id']}"
-        await until(lambda: b.get("/readyz"), lambda found: found["maps"])
+        shown = "/v1/sites/s/constraints?state=accepted"
+        await until(lambda: b.get(shown), lambda page: bool(page["constraints"]))
         answer = await b.client.post(f"{path}/what-if")
         assert answer.status_code == 503
         assert answer.json()["type"] == "/problems/not-ready"
