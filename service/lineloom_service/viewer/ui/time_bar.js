@@ -1,6 +1,6 @@
 import { h, refill } from "./dom.js";
 import { icon } from "./icon.js";
-import { plural, timeOfDay } from "./format.js";
+import { count, plural, timeOfDay } from "./format.js";
 
 const STEP_MS = 120;
 
