@@ -8,7 +8,7 @@ import { LineSet } from "./line_set.js";
  * A piece of trajectory at keyframe resolution: x, y per point in the component's frame.
  */
 
-/** What is made of a graph, which several versions may share. @type {WeakMap<import("../net/contract.js").GraphAnswer, {keyframes: Map<number, Keyframe>, paths: Path[]}>} */
+/** What is made of a graph, which several versions may share. @type {WeakMap<import("../net/contract.js").GraphAnswer, {keyframes: Map<string, Keyframe>, paths: Path[]}>} */
 const MADE_OF = new WeakMap();
 
 /** Everything that the page shows of a site at one version; never changed once made. */
