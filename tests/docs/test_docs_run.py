@@ -188,9 +188,11 @@ def test_the_commands_in_the_text(
     run = {s.text for s in spans() if why_not(s, UNRUN_SPANS) is None}
     assert CliRunner().invoke(app, ["simulate", "--duration", "2"]).exit_code == 0
     assert CliRunner().invoke(app, ["floorplan", "put", "building.dxf"]).exit_code == 4
+    with Client(stage.url) as client:
+        component = client.site("text").components[0].id
     failed = []
     for text in sorted(run, key=lambda text: (" simulate" not in text, " delete" in text, text)):
-        words = text.replace(SITE, "text").split()[1:]
+        words = text.replace(SITE, "text").replace(COMPONENT, component).split()[1:]
         done = CliRunner().invoke(app, [*words, *SHORTER.get(words[0], ())])
         if done.exit_code != CODES.get(text, 0):
             failed.append(f"{text}: code {done.exit_code}: {done.output} {done.exception}")
