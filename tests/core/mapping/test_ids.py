@@ -114,17 +114,17 @@ def test_ids_stay_whatever_the_order_of_the_log(
 ) -> None:
     def ids(view: SiteView) -> set[str]:
         # Which near loops are looked for after a merge goes by the keyframes' numbers.
-        constraints = [c for c in view.constraints if c.origin != "near"]
-        things = [*view.keyframes, *constraints, *view.places, *view.components]
-        return {thing.id for thing in things}
+        constraints = {c.id for c in view.constraints if c.origin != "near"}
+        placed = {k.id for k in view.keyframes} | {p.id for p in view.places}
+        return constraints | placed | {c.id for c in view.components}
 
     assert len(ids(shown)) > 100
     assert ids(shown) < ids(replays["other numbers"].view())
 
 
 def test_ids_are_fit_for_a_path_and_tell_everything_apart(shown: SiteView) -> None:
-    things = [*shown.keyframes, *shown.constraints, *shown.places, *shown.components]
-    ids = [thing.id for thing in things]
+    ids = [k.id for k in shown.keyframes] + [c.id for c in shown.constraints]
+    ids += [p.id for p in shown.places] + [c.id for c in shown.components]
     assert len(set(ids)) == len(ids)
     assert all(re.fullmatch(r"[krsnpc]-[a-z2-7]{16}", name) for name in ids)
 
