@@ -15,7 +15,7 @@ from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.matching import _registration_kernels as _kernels
 
 _SECTOR_RAD = math.radians(10.0)
-_SECTOR_SHIFT = 0.037
+_SECTOR_SHIFT = 0.113
 """Beams lie at whole or half degrees: none may lie on a border, where the last bit tells."""
 _LEAST_POINTS = 10  # of half a scan that a registration can be tried with
 _HALF_HOLD = np.diag([25.0, 25.0, 100.0])
