@@ -5,14 +5,14 @@ from __future__ import annotations
 import os
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from lineloom.wire import MAX_BATCH, MAX_BODY_BYTES
-from lineloom_core.mapping.config import MapperConfig
 from pydantic import Field, field_validator, model_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
-from lineloom_service.parameter_file import read_config
+if TYPE_CHECKING:
+    from lineloom_core.mapping.config import MapperConfig
 
 
 def _default_workers() -> int:
@@ -133,6 +133,8 @@ class Settings(BaseSettings):
     @classmethod
     def _check_parameters(cls, value: Path | None) -> Path | None:
         if value is not None:
+            from lineloom_service.parameter_file import read_config
+
             read_config(value)
         return value
 
@@ -158,6 +160,11 @@ class Settings(BaseSettings):
     @cached_property
     def mapper(self) -> MapperConfig:
         """The parameters of the file, and the defaults of the others."""
+        # Settings are read by what does without kernels as well: the command line, the health check.
+        from lineloom_core.mapping.config import MapperConfig
+
+        from lineloom_service.parameter_file import read_config
+
         return MapperConfig() if self.mapper_config is None else read_config(self.mapper_config)
 
     @property

@@ -68,7 +68,11 @@ async def test_a_put_makes_the_map_anew(
     told = await _remade(client, site)
     assert (told["type"], told["version"]) == ("remade", before["version"] + 1)
     assert told["robots"][0]["moved_m"] == 2.0  # as the fake mapper shows this parameter
-    stream = await client.get(f"{site}/events?follow=false", headers={"Last-Event-ID": place})
+    for _ in range(1000):  # events are told when they are on disk
+        stream = await client.get(f"{site}/events?follow=false", headers={"Last-Event-ID": place})
+        if "event: remade" in stream.text:
+            break
+        await asyncio.sleep(0.01)
     assert "event: remade" in stream.text
 
     again = await client.put(f"{site}/config", json={"join": {"least_set": 5}})

@@ -73,6 +73,7 @@ async def test_types_are_stable() -> None:
         "invalid-parameter",
         "malformed-body",
         "method-not-allowed",
+        "never-remade",
         "no-floor-plan",
         "not-connected",
         "not-found",
