@@ -160,7 +160,7 @@ class Settings(BaseSettings):
     @cached_property
     def mapper(self) -> MapperConfig:
         """The parameters of the file, and the defaults of the others."""
-        # Settings are read by what does without kernels as well: the command line, the health check.
+        # Settings are read by what does without kernels as well, as the command line.
         from lineloom_core.mapping.config import MapperConfig
 
         from lineloom_service.parameter_file import read_config
