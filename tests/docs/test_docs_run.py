@@ -52,7 +52,8 @@ PLAYS = {"clients/python/docs/command-line.md"}
 """Pages that play recordings, to a site of their own."""
 SHORTER = {"simulate": ("--duration", "3")}
 """What is added to commands of the text, lest they take minutes."""
-CODES = dict.fromkeys(("lineloom export", "lineloom floorplan", "lineloom token"), 2)
+GROUPS = ("lineloom config", "lineloom export", "lineloom floorplan", "lineloom token")
+CODES = dict.fromkeys(GROUPS, 2)
 CODES |= {"lineloom replay": 2, "lineloom floorplan show": 4}
 """What the commands of the text end with, if not 0: a group by itself shows its help, replay wants
 files, and the plan is another building's."""
