@@ -55,7 +55,7 @@ def test_free_space_between_places(
     expected = slow.judge_places(ref, cur, T.to_array(), step, *ARGS)
     assert expected.sum() == len(ref.surface.points[::step]) + len(cur.surface.points[::step])
     np.testing.assert_allclose(counts, expected, atol=1)  # a point at the border of two beams
-    assert expected[_free_space_kernels.MATCHED] > 10
+    assert expected[_free_space_kernels.MATCHED] > 5
     if off.x and step == 1:
         assert expected[_free_space_kernels.CONFLICT] > 20
         assert count_points(ref, cur, T) == (counts[0], counts[1])
