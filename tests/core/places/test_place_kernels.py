@@ -48,14 +48,14 @@ def matched(ref: Place, cur: Place, least_explained: float) -> Any:
 def test_free_space_between_places(
     half_turn_stretches: list[Stretch], off: Pose, step: int
 ) -> None:
-    s = half_turn_stretches[0]
+    s = half_turn_stretches[1]
     T = s.forth.T_world_anchor.between(s.back.T_world_anchor) @ off
     ref, cur, counts = s.forth.place, s.back.place, np.empty(4)
     judge_places(*sweeps_of(ref), *sweeps_of(cur), T.to_array(), step, *ARGS, counts)
     expected = slow.judge_places(ref, cur, T.to_array(), step, *ARGS)
     assert expected.sum() == len(ref.surface.points[::step]) + len(cur.surface.points[::step])
     np.testing.assert_allclose(counts, expected, atol=1)  # a point at the border of two beams
-    assert expected[_free_space_kernels.MATCHED] > 5
+    assert expected[_free_space_kernels.MATCHED] > 10
     if off.x and step == 1:
         assert expected[_free_space_kernels.CONFLICT] > 20
         assert count_points(ref, cur, T) == (counts[0], counts[1])
