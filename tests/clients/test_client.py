@@ -226,8 +226,8 @@ def test_not_ready_is_an_answer_and_not_an_error(run: Run, fake: FakeService) ->
 def test_constraints_come_page_by_page(run: Run, fake: FakeService) -> None:
     def page(request: httpx.Request) -> httpx.Response:
         cursor = request.url.params.get("cursor")
-        entry = {"kind": "loop", "state": "accepted", "keyframe_a": "k-a", "keyframe_b": "k-b"}
-        entry |= {"id": cursor or "first", "T_a_b": {"x": 1, "y": 0, "theta": 0}}
+        entry: dict[str, Any] = {"kind": "loop", "state": "accepted", "id": cursor or "first"}
+        entry |= {"keyframe_a": "k-a", "keyframe_b": "k-b", "T_a_b": {"x": 1, "y": 0, "theta": 0}}
         entry |= {"information": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "reason": "consistent"}
         entry |= {"checks": {}, "consistency_set": []}
         following = {None: "second", "second": None}[cursor]
