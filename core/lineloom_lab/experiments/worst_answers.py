@@ -6,15 +6,11 @@ that are right in all but the slide they declare count as right. Each is told by
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from lineloom_core.geometry import Pose
 from lineloom_core.matching.result import MatchResult
-from lineloom_core.scan import Scan
-from numpy.typing import NDArray
 
 from lineloom_lab.evaluation.pair_bench_sets import BenchPair
 from lineloom_lab.evaluation.pairs import (
@@ -25,12 +21,8 @@ from lineloom_lab.evaluation.pairs import (
 )
 from lineloom_lab.evaluation.pose_error import pose_error
 from lineloom_lab.experiments.figure import Figure, grid
-from lineloom_lab.experiments.plan import Bounds, Layer, Plan
-
-REFERENCE_COLOUR = "#1d4ed8"
-CURRENT_COLOUR = "#c1121f"
-_REACH_M = 7.0
-_DOT_M, _HEADING_M = 0.02, 0.8
+from lineloom_lab.experiments.overlay import overlay
+from lineloom_lab.experiments.plan import Plan
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,45 +88,10 @@ def _near(found: Pose, truth: Pose) -> bool:
 def _panels(answer: BadAnswer) -> list[Plan]:
     pair, result = answer.row.pair, answer.result
     told = f"{answer.set_name} {answer.index}, {answer.row.group}"
-    truth = Plan(
-        f"{told}: true pose, overlap {100 * pair.overlap:.0f} %",
-        _layers(pair.reference, pair.current, pair.T_ref_cur),
-        _around(pair.T_ref_cur),
-    )
+    overlap = f"{told}: true pose, overlap {100 * pair.overlap:.0f} %"
+    truth = overlay(overlap, pair.reference, pair.current, pair.T_ref_cur)
     pose = result.best or result.T_reference_current
     said = f'"{result.verdict}", score {result.score:.2f}, {answer.why}'
     if pose is None:
-        nothing = Layer("reference", _dots(pair.reference.points()), REFERENCE_COLOUR)
-        return [Plan(f"{said}: no pose at all", (nothing,), _around(Pose.identity())), truth]
-    layers = _layers(pair.reference, pair.current, pose)
-    return [Plan(said, layers, _around(pose)), truth]
-
-
-def _layers(reference: Scan, current: Scan, T_ref_cur: Pose) -> tuple[Layer, ...]:
-    seen = T_ref_cur.transform(current.points())
-    return (
-        Layer("reference", _dots(reference.points()), REFERENCE_COLOUR, 3.0),
-        Layer("current", _dots(seen), CURRENT_COLOUR, 3.0, 0.8),
-        Layer("", (_arrow(Pose.identity()),), REFERENCE_COLOUR, 4.0),
-        Layer("", (_arrow(T_ref_cur),), CURRENT_COLOUR, 4.0),
-    )
-
-
-def _dots(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
-    """Return each point as a stroke a few centimetres long: layers are lines."""
-    half = np.array([_DOT_M, 0.0])
-    return tuple(np.array([p - half, p + half]) for p in points)
-
-
-def _arrow(pose: Pose) -> NDArray[np.float64]:
-    """Return where a laser stands and looks, as a polyline."""
-    tip = np.array([_HEADING_M, 0.0])
-    barbs = [(0.65 * _HEADING_M, side * 0.2 * _HEADING_M) for side in (1.0, -1.0)]
-    return pose.transform(np.array([(0.0, 0.0), tip, barbs[0], tip, barbs[1]]))
-
-
-def _around(pose: Pose) -> Bounds:
-    """Return the part of the plane that shows both lasers and what is near them."""
-    reach = _REACH_M + 0.25 * math.hypot(pose.x, pose.y)
-    x, y = 0.5 * pose.x, 0.5 * pose.y
-    return x - 1.3 * reach, y - reach, x + 1.3 * reach, y + reach
+        said = f"{said}: no pose at all"
+    return [overlay(said, pair.reference, pair.current, pose), truth]

@@ -1,4 +1,4 @@
-"""`lineloom bench`: how good the matchers and the merging are, measured here."""
+"""`lineloom bench`: how good the matchers, the mapping and the merging are, measured here."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from lineloom.cli import options
+from lineloom.cli.bench_logs import logs
 from lineloom.cli.bench_merges import merges
 from lineloom.cli.console import note, out, print_json
 from lineloom.cli.failure import CommandError, Exit
@@ -25,14 +26,16 @@ SHARED_PAIRS = Path(__file__).resolve().parents[5] / "shared" / "data" / "pairs"
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 app.command("merges")(merges)
+app.command("logs")(logs)
 
 
 @app.callback()
 def bench() -> None:
-    """Measure how good the matchers are, and how safe the merging.
+    """Measure how good the matchers are, what becomes of real logs, and how safe the merging is.
 
     \b
     Example:
+      lineloom bench logs --quick
       lineloom bench merges --quick
       lineloom bench pairs --limit 10
     """
