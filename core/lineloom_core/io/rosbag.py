@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 from rosbags.highlevel import AnyReader, AnyReaderError
-from rosbags.typesys import Stores, get_typestore
 
 from lineloom_core.geometry import Pose
+from lineloom_core.io.bag_index import opened
 from lineloom_core.io.odometry_track import OdometryTrack
 from lineloom_core.io.static_transforms import StaticTransforms, planar
 from lineloom_core.scan import InvalidScanError, Mount, Scan
@@ -70,7 +70,7 @@ def read_bag(path: str | Path, options: BagOptions | None = None) -> tuple[BagRo
     chosen = options or BagOptions()
     source = Path(path)
     try:
-        with AnyReader([source], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        with opened(source) as reader:
             found = _gather(reader, _scan_topics(reader, chosen, source))
     except AnyReaderError as error:
         raise RosbagError(f"{source}: not a bag that can be read: {error}") from None

@@ -139,13 +139,16 @@ def _bare(robot: str, scans: tuple[Scan, ...]) -> Recording:
 
 
 def _with_pseudo(recordings: tuple[Recording, ...], path: Path) -> BenchLog:
+    """Add naive poses of the only recording's first scans; there may be none of the last ones."""
     with np.load(path) as data:
         poses, score = data["P"].astype(np.float64), data["SC"]
     only = recordings[0]
-    if len(recordings) > 1 or len(poses) != len(only.scans):
+    missing = len(only.scans) - len(poses)
+    if len(recordings) > 1 or missing < 0:
         raise ValueError(f"{path}: {len(poses)} poses for {len(only.scans)} scans of {only.robot}")
     trust: Trust = "pseudo" if np.quantile(score, _SURE_QUANTILE) > _SURE_SCORE else "doubtful"
-    return BenchLog((Recording(only.robot, only.scans, poses, only.inverted),), trust)
+    reference = np.vstack([poses, no_reference(missing)])
+    return BenchLog((Recording(only.robot, only.scans, reference, only.inverted),), trust)
 
 
 def _stem(path: Path) -> str:

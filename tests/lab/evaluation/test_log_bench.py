@@ -244,9 +244,9 @@ def test_a_recording_with_odometry_stands_in_for_the_one_without(tmp_path: Path)
 
 def test_a_pseudo_reference_of_other_scans_is_refused(tmp_path: Path) -> None:
     write_logs(tmp_path)
-    np.savez(tmp_path / "field" / "flat.pseudo.npz", P=np.zeros((7, 3)), SC=np.ones(7))
+    np.savez(tmp_path / "field" / "flat.pseudo.npz", P=np.zeros((47, 3)), SC=np.ones(47))
     log = next(log for log in log_files(tmp_path) if log.name == "flat")
-    with pytest.raises(ValueError, match="7 poses for 40 scans"):
+    with pytest.raises(ValueError, match="47 poses for 40 scans"):
         log.load()
 
 
