@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 T = TypeVar("T")
 Number = TypeVar("Number", int, float)
+Word = TypeVar("Word", bound=str)
 
 _BOUNDS = {"share": (0.0, 1.0), "rad": (0.0, math.pi), "m": (0.0, 1000.0), "s": (0.0, 86_400.0)}
 
@@ -51,6 +52,22 @@ class Parameter:
         return int(value) if self.whole else float(value)
 
 
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A parameter that is one of a few words."""
+
+    value: str
+    default: str
+    meaning: str
+    choices: tuple[str, ...]
+
+    def checked(self, name: str, value: object) -> str:
+        """Return a value for it. Raises ParameterError."""
+        if not isinstance(value, str) or value not in self.choices:
+            raise ParameterError(name, f"has to be {' or '.join(self.choices)}, not {value!r}")
+        return value
+
+
 def parameter(
     default: Number, unit: str, meaning: str, least: float | None = None, most: float | None = None
 ) -> Number:
@@ -58,6 +75,12 @@ def parameter(
     low, high = _BOUNDS.get(unit, (0.0, 1e9))
     described = (unit, meaning, low if least is None else least, high if most is None else most)
     made: Any = field(default=default, metadata={"parameter": described})
+    return made  # type: ignore[no-any-return]
+
+
+def choice(default: Word, meaning: str, choices: tuple[Word, ...]) -> Word:
+    """Return the field of a parameters' dataclass that holds one of these words."""
+    made: Any = field(default=default, metadata={"choice": (meaning, choices)})
     return made  # type: ignore[no-any-return]
 
 
@@ -72,6 +95,8 @@ def _described(config: Any, default: Any) -> dict[str, Any]:
         value, usual = getattr(config, f.name), getattr(default, f.name)
         if is_dataclass(value):
             found[f.name] = _described(value, usual)
+        elif "choice" in f.metadata:
+            found[f.name] = Choice(value, usual, *f.metadata["choice"])
         else:
             unit, meaning, least, most = f.metadata["parameter"]
             whole = isinstance(usual, int)
@@ -101,7 +126,7 @@ def _changed(config: Any, known: dict[str, Any], changes: Any, above: str) -> An
         name = f"{above}.{key}" if above else str(key)
         if key not in known:
             raise ParameterError(name, "is not a parameter")
-        if isinstance(known[key], Parameter):
+        if isinstance(known[key], Parameter | Choice):
             new[key] = known[key].checked(name, value)
         else:
             new[key] = _changed(getattr(config, key), known[key], value, name)

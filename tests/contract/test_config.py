@@ -45,7 +45,11 @@ async def test_every_parameter_is_told(
         "meaning": expected["join.least_evidence"].meaning,
         "least": 0.0,
         "most": 1000.0,
+        "choices": None,
     }
+    matcher = answer["parameters"]["matcher"]
+    assert (matcher["value"], matcher["choices"]) == ("lineloom", ["lineloom", "thesis"])
+    assert (matcher["least"], matcher["most"], matcher["unit"]) == (None, None, "")
     assert (answer["own"], answer["position"], answer["remaking"]) == ({}, None, None)
     expect_problem(await client.get("/v1/sites/told/config/difference"), 404, "never-remade")
     expect_problem(await client.get("/v1/sites/nowhere/config"), 404, "unknown-site")
@@ -99,6 +103,7 @@ async def test_what_a_put_does_not_name_is_the_default(client: httpx.AsyncClient
         ({"chapter": 8, "join": {"least_sett": 3}}, "/join/least_sett", "not a parameter"),
         ({"chapter": 8, "join": {"least_set": 0}}, "/join/least_set", "from 1 to"),
         ({"chapter": 8, "join": {"least_set": "3"}}, "/join/least_set", "a number"),
+        ({"chapter": 8, "matcher": "karto"}, "/matcher", "lineloom or thesis"),
         ({"chapter": 8, "tracker": 3}, "/tracker", "by name"),
         ({"chapter": 8, "persistence": {"near": 1}}, "/persistence/near", "persistence.far"),
         ([1], "", "by name"),

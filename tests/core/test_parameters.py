@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from lineloom_core.mapping.config import JoinConfig, MapperConfig, config_from
-from lineloom_core.parameters import ParameterError, by_name, effective, values
+from lineloom_core.parameters import Choice, ParameterError, by_name, effective, values
 
 PARAMETERS = dict(by_name(effective(MapperConfig())))
 
@@ -15,8 +15,13 @@ PARAMETERS = dict(by_name(effective(MapperConfig())))
 def test_every_parameter_has_a_meaning_and_a_default_that_can_be() -> None:
     assert len(PARAMETERS) > 120, "the search for parameters is broken"
     assert [name for name, p in PARAMETERS.items() if not p.meaning] == []
-    assert [name for name, p in PARAMETERS.items() if not p.least <= p.default <= p.most] == []
-    assert [name for name, p in PARAMETERS.items() if p.whole != isinstance(p.value, int)] == []
+    words = {name: p for name, p in PARAMETERS.items() if isinstance(p, Choice)}
+    numbers = {name: p for name, p in PARAMETERS.items() if name not in words}
+    assert [name for name, p in numbers.items() if not p.least <= p.default <= p.most] == []
+    assert [name for name, p in numbers.items() if p.whole != isinstance(p.value, int)] == []
+    assert {name: (p.default, p.choices) for name, p in words.items()} == {
+        "matcher": ("lineloom", ("lineloom", "thesis"))
+    }
 
 
 def test_what_differs_from_the_default_shows() -> None:
@@ -58,6 +63,8 @@ def test_what_is_not_given_is_the_base_s() -> None:
         ({"chapter": "many"}, "chapter", "a number, not 'many'"),
         ({"chapter": {"of": 3}}, "chapter", "a number"),
         ({"localise": {"recognition": {"cell": 0}}}, "localise.recognition.cell", "from 0.02"),
+        ({"matcher": "karto"}, "matcher", "lineloom or thesis, not 'karto'"),
+        ({"matcher": 3}, "matcher", "lineloom or thesis, not 3"),
         ({"persistence": {"near": 0.5}}, "persistence.near", "persistence.far only 0.3"),
     ],
 )

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 from lineloom_core.codec import storable
 from lineloom_core.features import ExtractionConfig
 from lineloom_core.fusion import FusionConfig
 from lineloom_core.fusion.persistence import PersistenceConfig
-from lineloom_core.parameters import ParameterError, parameter, with_values
+from lineloom_core.parameters import ParameterError, choice, parameter, with_values
 from lineloom_core.places.recognition import RecognitionConfig
 
 
@@ -240,6 +240,11 @@ class MapperConfig:
     fusion: FusionConfig = field(default_factory=FusionConfig)
     persistence: PersistenceConfig = field(default_factory=PersistenceConfig)
     localise: LocaliseConfig = field(default_factory=LocaliseConfig)
+    matcher: Literal["lineloom", "thesis"] = choice(
+        "lineloom",
+        "what follows a robot from scan to scan; thesis: that one's line segment matcher alone",
+        ("lineloom", "thesis"),
+    )
     checkpoint_every: int = parameter(
         256, "keyframes", "at least from one checkpoint to the next", 1
     )

@@ -17,7 +17,7 @@ from lineloom_core.kernels.target import target_name
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.parameters import values
 
-NOT_RUN = ("io/", "floorplan/", "matching/thesis/", "warm_up/")
+NOT_RUN = ("io/", "floorplan/", "warm_up/")
 """What of this package the mapper does without; a test holds it to what it imports."""
 
 _LIBRARIES = ("numpy", "scipy", "gtsam")

@@ -7,7 +7,7 @@ from dataclasses import replace
 from fastapi import APIRouter, Request, Response
 from lineloom import wire
 from lineloom_core.mapping.config import MapperConfig
-from lineloom_core.parameters import ParameterError, by_name, effective
+from lineloom_core.parameters import Choice, Parameter, ParameterError, by_name, effective
 
 from lineloom_service.answers import answer
 from lineloom_service.convert import to_remaking
@@ -85,15 +85,20 @@ def _config(site: SiteRecord, service: Service) -> wire.SiteConfig:
     config = in_force(site, service.settings.mapper)
     return wire.SiteConfig(
         site=site.name,
-        parameters={
-            name: wire.ParameterValue(
-                value=p.value, default=p.default, unit=p.unit, meaning=p.meaning,
-                least=p.least, most=p.most,
-            )
-            for name, p in by_name(effective(config))
-        },
+        parameters={name: _value(p) for name, p in by_name(effective(config))},
         own={} if entry is None else dict(entry.own),
         position=None if entry is None else entry.position,
         digest=ordered({}, config).digest if entry is None else entry.digest,
         remaking=to_remaking(service.conductor.remaking(site.id)),
-    )  # fmt: skip
+    )
+
+
+def _value(p: Parameter | Choice) -> wire.ParameterValue:
+    if isinstance(p, Choice):
+        return wire.ParameterValue(
+            value=p.value, default=p.default, unit="", meaning=p.meaning,
+            least=None, most=None, choices=list(p.choices),
+        )  # fmt: skip
+    return wire.ParameterValue(
+        value=p.value, default=p.default, unit=p.unit, meaning=p.meaning, least=p.least, most=p.most
+    )

@@ -37,6 +37,14 @@ def test_parameters_are_set_one_by_one_and_taken_back(url: str) -> None:
     assert len(run(url, "show", "--all", "--site", "s").stdout.splitlines()) > 120
 
 
+def test_a_word_is_set_as_a_number_is(url: str) -> None:
+    done = run(url, "set", "matcher=thesis", "--site", "w")
+    assert done.exit_code == 0, done.output
+    assert done.stdout.startswith("matcher = thesis (lineloom): ")
+    with Client(url) as client:
+        assert client.config("w").parameters["matcher"].choices == ["lineloom", "thesis"]
+
+
 def test_a_file_takes_the_place_of_all_that_was_set(url: str, tmp_path: Path) -> None:
     run(url, "set", "chapter=64", "--site", "t")
     file = tmp_path / "mapper.toml"
@@ -51,7 +59,8 @@ def test_a_file_takes_the_place_of_all_that_was_set(url: str, tmp_path: Path) ->
     [
         ("join.least_sett=4", "/join/least_sett: is not a parameter"),
         ("join.least_set=0", "/join/least_set: has to be from 1"),
-        ("join.least_set=many", "'many' is not a number"),
+        ("join.least_set=many", "/join/least_set: has to be a number, not 'many'"),
+        ("matcher=karto", "/matcher: has to be lineloom or thesis, not 'karto'"),
         ("join.least_set", "write NAME=VALUE"),
     ],
 )

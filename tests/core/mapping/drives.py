@@ -11,7 +11,8 @@ from lineloom_core.features import extract_features
 from lineloom_core.geometry import Pose
 from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_core.mapping.changes import Changes
-from lineloom_core.mapping.facts.tracker import Tracked, Tracker
+from lineloom_core.mapping.facts.tracker import Tracked
+from lineloom_core.mapping.facts.trackers import AnyTracker
 from lineloom_core.mapping.site_mapper import SiteMapper
 from lineloom_core.matching.local_map import Cloud
 from lineloom_core.scan import Mount, Scan
@@ -64,7 +65,7 @@ def empty(scan: Scan) -> Scan:
     return replace(scan, ranges=np.full(len(scan), np.inf))
 
 
-def track(tracker: Tracker, scan: Scan, stamp: float | None = None) -> Tracked:
+def track(tracker: AnyTracker, scan: Scan, stamp: float | None = None) -> Tracked:
     """Give a scan to the tracker as the mapper does, with its odometry if it has any."""
     features = extract_features(scan)
     at = scan.stamp if stamp is None else stamp

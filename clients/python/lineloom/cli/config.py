@@ -60,7 +60,8 @@ def show(
 @app.command("set")
 def set_(
     changes: Annotated[
-        list[str], typer.Argument(metavar="NAME=VALUE…", help="E.g. join.least_set=4.")
+        list[str],
+        typer.Argument(metavar="NAME=VALUE…", help="E.g. join.least_set=4 matcher=thesis."),
     ],
     site: options.Site = options.DEFAULT_SITE,
     url: options.Url = None,
@@ -153,7 +154,7 @@ def _apply(own: dict[str, Any], change: str) -> None:
     try:
         table[last] = json_text.loads(text)
     except ValueError:
-        raise CommandError(f"{name}: {text!r} is not a number", Exit.USAGE) from None
+        table[last] = text  # a word: the service knows where there is one, and which
 
 
 def _report(found: SiteConfig, *, json: bool) -> None:
@@ -167,6 +168,10 @@ def _report(found: SiteConfig, *, json: bool) -> None:
 def _print(found: SiteConfig, *, every: bool) -> None:
     for name, p in found.parameters.items():
         if every or p.value != p.default:
-            usual = "" if p.value == p.default else f" ({p.default:g})"
-            value = f"{name} = {p.value:g}{usual} {p.unit}".rstrip()
+            usual = "" if p.value == p.default else f" ({_shown(p.default)})"
+            value = f"{name} = {_shown(p.value)}{usual} {p.unit}".rstrip()
             out.print(f"{value}: {p.meaning}", markup=False, soft_wrap=True)
+
+
+def _shown(value: float | str) -> str:
+    return value if isinstance(value, str) else f"{value:g}"

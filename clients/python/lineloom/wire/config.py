@@ -15,14 +15,19 @@ class ConfigChange(RootModel[dict[str, Any]]):
 
 
 class ParameterValue(Answer):
-    """A parameter as it holds now. unit: "" for a plain number; a share is from 0 to 1."""
+    """A parameter as it holds now.
 
-    value: int | float
-    default: int | float
+    unit: "" for a plain number; a share is from 0 to 1. least, most: what it can be, null for a
+    word, which is one of `choices`.
+    """
+
+    value: int | float | str
+    default: int | float | str
     unit: str
     meaning: str
-    least: float
-    most: float
+    least: float | None
+    most: float | None
+    choices: list[str] | None = None
 
 
 class SiteConfig(Answer):

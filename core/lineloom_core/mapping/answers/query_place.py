@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from lineloom_core.features import extract_features
 from lineloom_core.geometry import Pose
 from lineloom_core.mapping.config import MapperConfig
-from lineloom_core.mapping.facts.tracker import Tracker
+from lineloom_core.mapping.facts.trackers import new_tracker
 from lineloom_core.matching.local_map import Cloud
 from lineloom_core.places import Glimpse, Place, Seen
 from lineloom_core.scan import Scan
@@ -20,7 +20,7 @@ def query_place(scans: Sequence[Scan], config: MapperConfig) -> Place | None:
     are passed over. Where the track breaks, what came before counts no more. Of a long run the last
     metres count, as in any place. None where no scan shows anything.
     """
-    tracker, seen = Tracker(config.tracker), list[tuple[Glimpse, bool]]()
+    tracker, seen = new_tracker(config), list[tuple[Glimpse, bool]]()
     for number, scan in enumerate(scans):
         features = extract_features(scan.counter_clockwise(), config.extraction)
         if len(features.points) == 0:
@@ -28,7 +28,7 @@ def query_place(scans: Sequence[Scan], config: MapperConfig) -> Place | None:
         cloud = Cloud.of(features)
         tracked = tracker.track(features, cloud, scan.stamp, scan.odometry)
         if tracked.status == "lost":
-            tracker, seen = Tracker(config.tracker), []
+            tracker, seen = new_tracker(config), []
             tracked = tracker.track(features, cloud, scan.stamp, scan.odometry)
         if tracked.pose is not None:
             seen.append((Glimpse(number, Seen(features, cloud), tracked.pose), tracked.is_keyframe))

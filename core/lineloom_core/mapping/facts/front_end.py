@@ -24,7 +24,8 @@ from lineloom_core.mapping.facts.information import step_information
 from lineloom_core.mapping.facts.keyframe import Keyframe, Step
 from lineloom_core.mapping.facts.placed_scans import PlacedScan
 from lineloom_core.mapping.facts.robot_record import RobotRecord
-from lineloom_core.mapping.facts.tracker import Tracked, Tracker
+from lineloom_core.mapping.facts.tracker import Tracked
+from lineloom_core.mapping.facts.trackers import new_tracker
 from lineloom_core.matching.local_map import Cloud, LocalMap
 from lineloom_core.scan import Scan
 
@@ -119,7 +120,7 @@ def _track(
 
 
 def _begin_track(config: MapperConfig, record: RobotRecord) -> None:
-    record.tracker, record.track, record.last_keyframe = Tracker(config.tracker), None, None
+    record.tracker, record.track, record.last_keyframe = new_tracker(config), None, None
 
 
 def _laser_odometry(record: RobotRecord, scan: Scan) -> Pose | None:

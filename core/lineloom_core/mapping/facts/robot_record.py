@@ -9,7 +9,7 @@ from lineloom_core.health import SensorDoctor
 from lineloom_core.mapping.facts.placed_scans import PlacedScan, PlacedScans
 from lineloom_core.mapping.facts.robot_state import RobotState
 from lineloom_core.mapping.facts.scan_name import ScanName
-from lineloom_core.mapping.facts.tracker import Tracker
+from lineloom_core.mapping.facts.trackers import AnyTracker
 from lineloom_core.mapping.facts.unplaced_scan import UnplacedScan
 from lineloom_core.scan import Mount, Scan
 
@@ -21,7 +21,7 @@ class RobotRecord:
 
     name: str
     mount: Mount = field(default_factory=Mount)
-    tracker: Tracker | None = None
+    tracker: AnyTracker | None = None
     track: int | None = None
     """Number of the track that it is on."""
     last_keyframe: int | None = None
