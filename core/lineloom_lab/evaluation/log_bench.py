@@ -13,7 +13,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -24,9 +24,10 @@ from lineloom_core.scan import Mount, Scan
 from lineloom_core.warm_up.drive import drive
 
 from lineloom_lab.evaluation.log_bench_cases import Setting
-from lineloom_lab.evaluation.log_bench_clocks import with_clock
+from lineloom_lab.evaluation.log_bench_clocks import TRUE_CLOCK, with_clock
 from lineloom_lab.evaluation.log_bench_judge import LogFigures, PlacedRobot, judge
 from lineloom_lab.evaluation.log_bench_log import BenchLog, Half, LogSource, Recording, Trust
+from lineloom_lab.evaluation.log_bench_sameness import same_share
 from lineloom_lab.evaluation.log_bench_steps import StepFigures, step_figures
 
 _TURN_SCANS = 50
@@ -46,7 +47,11 @@ class LogCase:
 
 @dataclass(frozen=True, slots=True)
 class LogResult:
-    """What became of a log. cpu_ms: mapping, per scan. unreadable: why there is nothing else."""
+    """What became of a log.
+
+    cpu_ms: mapping, per scan. share_same: of what the same run under the true clock placed, what
+    lies likewise here; None without such a run. unreadable: why there is nothing else.
+    """
 
     log: str
     half: Half
@@ -55,7 +60,9 @@ class LogResult:
     figures: LogFigures | None
     steps: StepFigures | None
     cpu_ms: float
+    share_same: float | None = None
     unreadable: str | None = None
+    placed: tuple[PlacedRobot, ...] = field(default=(), compare=False, repr=False)
 
 
 def run_log_bench(
@@ -74,7 +81,7 @@ def run_log_bench(
     for result in _all_results(cases, jobs, config, witness):
         results.append(result)
         on_progress(_progress(result, len(results), len(cases)))
-    return tuple(results)
+    return _with_sameness(results)
 
 
 def run_case(
@@ -85,7 +92,8 @@ def run_case(
         log = _loaded(case.source)
     except (ValueError, OSError) as error:
         return LogResult(
-            case.source.name, case.source.half, case.setting, "none", None, None, 0.0, str(error)
+            *(case.source.name, case.source.half, case.setting, "none", None, None, 0.0),
+            unreadable=str(error),
         )
     robots = robots_of(log, case.setting)
     view, cpu_s = play(robots, config)
@@ -100,6 +108,7 @@ def run_case(
         judge(placed),
         step_figures(placed),
         1e3 * cpu_s / sum(len(robot.scans) for robot in robots),
+        placed=tuple(placed),
     )
 
 
@@ -135,6 +144,19 @@ def play(robots: Sequence[Recording], config: MapperConfig | None) -> tuple[Site
     for name, scan in _in_turns(robots):
         mapper.add(name, scan)
     return mapper.view(), time.process_time() - begin
+
+
+def _with_sameness(results: Sequence[LogResult]) -> tuple[LogResult, ...]:
+    """Hold each run under another clock against the one under the true clock."""
+    true = {(r.log, r.setting): r.placed for r in results if r.setting.clock == TRUE_CLOCK}
+
+    def compared(result: LogResult) -> LogResult:
+        twin = true.get((result.log, replace(result.setting, clock=TRUE_CLOCK)))
+        if not twin or not result.placed or result.setting.clock == TRUE_CLOCK:
+            return result
+        return replace(result, share_same=same_share(twin, result.placed))
+
+    return tuple(compared(result) for result in results)
 
 
 def _numbered(scans: Sequence[Scan], *, odometry: bool) -> Iterator[Scan]:

@@ -126,7 +126,7 @@ def judge(robots: Sequence[PlacedRobot]) -> LogFigures:
     )
     names, counts = np.unique(component, return_counts=True)
     in_largest = component == names[counts.argmax()] if len(names) else np.zeros(0, dtype=bool)
-    errors = None if blind else _errors(poses[in_largest], truth[in_largest])
+    errors = None if blind else aligned_errors(poses[in_largest], truth[in_largest])
     relations = [(0, 0) if blind else _relations(r) for r in robots]
     return LogFigures(
         scans=sum(len(r.component) for r in robots),
@@ -151,7 +151,7 @@ def _wrong(poses: Array, truth: Array, component: NDArray[np.str_]) -> int:
     total = 0
     for name in np.unique(component):
         own = component == name
-        total += int(np.count_nonzero(_errors(poses[own], truth[own]) > WRONG_M))
+        total += int(np.count_nonzero(aligned_errors(poses[own], truth[own]) > WRONG_M))
     return total
 
 
@@ -178,15 +178,18 @@ def relation_error(a: Array, b: Array, true_a: Array, true_b: Array) -> Array:
     return se2.between(se2.between(true_a, true_b), se2.between(a, b))
 
 
-def _errors(poses: Array, truth: Array) -> Array:
+def aligned_errors(
+    poses: Array, truth: Array, by: NDArray[np.bool_] | slice = slice(None)
+) -> Array:
     """Return distances after the best rigid motion of the positions is taken out, shape (n,) [m].
 
-    Unlike `trajectory.align_rigid` this has an answer for one pose, and for poses in one place.
+    by: which rows it is the best for. Unlike `trajectory.align_rigid` this has an answer for one
+    pose, and for poses in one place.
     """
     if len(poses) == 0:
         return np.empty(0)
-    a, b = (rows[:, :2] - rows[:, :2].mean(axis=0) for rows in (poses, truth))
-    U, _, V = np.linalg.svd(a.T @ b)
+    a, b = (rows[:, :2] - rows[by, :2].mean(axis=0) for rows in (poses, truth))
+    U, _, V = np.linalg.svd(a[by].T @ b[by])
     R = (U @ np.diag([1.0, np.sign(np.linalg.det(U @ V))]) @ V).T
     errors: Array = np.linalg.norm(a @ R.T - b, axis=1)
     return errors

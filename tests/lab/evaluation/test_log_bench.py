@@ -24,10 +24,10 @@ from lineloom_lab.evaluation.log_bench_cases import (
 )
 from lineloom_lab.evaluation.log_bench_clocks import CLOCK_NAMES, with_clock
 from lineloom_lab.evaluation.log_bench_files import log_files
+from lineloom_lab.evaluation.log_bench_halves import pools_by_half
 from lineloom_lab.evaluation.log_bench_judge import PlacedRobot
 from lineloom_lab.evaluation.log_bench_log import BenchLog, Half, Recording, half_of
 from lineloom_lab.evaluation.log_bench_report import to_json, to_markdown
-from lineloom_lab.evaluation.log_bench_summary import half_rows
 from lineloom_lab.experiments.worst_steps import StepAlbum, draw_worst_steps, overlap_share
 from lineloom_lab.simulation import SimulatedRobot, rooms, sick_lms200
 from typer.testing import CliRunner
@@ -86,15 +86,15 @@ def test_a_small_log_becomes_one_right_map(results: tuple[LogResult, ...]) -> No
 def test_a_log_that_cannot_be_read_is_told_and_not_counted(results: tuple[LogResult, ...]) -> None:
     assert results[-1].unreadable == "small: is broken"
     assert "bad: small: is broken" in to_markdown(results)
-    assert {row.half for row in half_rows(results)} == {"A", "B"}
+    assert {half for _, half in pools_by_half(results)} == {"A", "B"}
 
 
 def test_halves_stand_side_by_side(results: tuple[LogResult, ...]) -> None:
-    rows = half_rows(results)
-    assert [(row.setting.parts, row.half, row.logs) for row in rows] == [
+    pools = pools_by_half(results)
+    assert [(setting.parts, half, pool.logs) for (setting, half), pool in pools.items()] == [
         (1, "A", 1), (1, "B", 1), (3, "A", 1), (3, "B", 1),
     ]  # fmt: skip
-    assert rows[0].whole == 1
+    assert pools[Setting(), "A"].whole == 1
     table = to_markdown(results)
     assert "| in largest % A " in table
     assert "| in largest % B " in table
@@ -144,6 +144,15 @@ def test_clocks_change_stamps_alone() -> None:
     assert np.abs(stamps["jittered"] - true).max() <= 0.2
     assert with_clock(scans, "x3")[0].time_increment == pytest.approx(3e-4)
     assert with_clock(scans, "stopped")[0].time_increment == 1e-4
+
+
+def test_what_another_clock_makes_of_a_log_is_held_against_the_true_one() -> None:
+    clocks = ("true", "x3", "x20")
+    runs = run_log_bench([LogCase(Small(scans=40), Setting(clock=clock)) for clock in clocks])
+    assert runs[0].share_same is None
+    assert all(run.share_same is not None and run.share_same <= 1.0 for run in runs[1:])
+    alone = run_log_bench([LogCase(Small(scans=9), Setting(clock="x3"))])
+    assert alone[0].share_same is None
 
 
 def test_settings_are_all_different_and_nonsense_is_refused() -> None:

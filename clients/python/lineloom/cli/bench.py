@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from lineloom.cli import options
+from lineloom.cli.bench_ladders import ladders
 from lineloom.cli.bench_logs import logs
 from lineloom.cli.bench_merges import merges
 from lineloom.cli.console import note, out, print_json
@@ -27,6 +28,7 @@ SHARED_PAIRS = Path(__file__).resolve().parents[5] / "shared" / "data" / "pairs"
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 app.command("merges")(merges)
 app.command("logs")(logs)
+app.command("ladders")(ladders)
 
 
 @app.callback()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lineloom.cli.bench_runs import Jobs, JsonFile, Pictures, run_and_print
+from lineloom.cli.bench_runs import Jobs, JsonFile, Pictures, deliver, run
 from lineloom.cli.failure import CommandError, Exit
 from lineloom.cli.one_thread import use_one_thread
 
@@ -80,6 +80,7 @@ def logs(
     try:
         from lineloom_lab.evaluation.log_bench import LogCase
         from lineloom_lab.evaluation.log_bench_cases import with_odometry
+        from lineloom_lab.evaluation.log_bench_report import to_json, to_markdown
     except ImportError:
         raise CommandError(
             "benchmarks need the core: `pip install lineloom-client[server]`"
@@ -90,7 +91,8 @@ def logs(
     chosen = _chosen(data or SHARED_LOGS, names, odometry)
     # The settings of one log follow each other, so that it is read once.
     cases = [LogCase(log, setting) for log in chosen for setting in settings]
-    run_and_print(cases, jobs, pictures, json)
+    results = run(cases, jobs, pictures, json)
+    deliver(to_json(results), to_markdown(results), json)
 
 
 def _settings(

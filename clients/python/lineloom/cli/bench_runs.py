@@ -5,7 +5,7 @@ from __future__ import annotations
 import json as json_format
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,7 +13,7 @@ from lineloom.cli.console import note, out, print_json
 from lineloom.cli.failure import CommandError
 
 if TYPE_CHECKING:
-    from lineloom_lab.evaluation.log_bench import LogCase
+    from lineloom_lab.evaluation.log_bench import LogCase, LogResult
 
 Jobs = Annotated[
     int, typer.Option(min=1, max=64, metavar="N", help="Runs at a time, a process each.")
@@ -30,28 +30,30 @@ JsonFile = Annotated[
 ]
 
 
-def run_and_print(
+def run(
     cases: Sequence[LogCase], jobs: int, pictures: Path | None, json: Path | None
-) -> None:
-    """Run the cases, and print the table or, for `--json -`, one JSON document."""
+) -> tuple[LogResult, ...]:
+    """Run the cases; before that, find out whether what they give can be written."""
     from lineloom_lab.evaluation.log_bench import run_log_bench
-    from lineloom_lab.evaluation.log_bench_report import to_json, to_markdown
     from lineloom_lab.experiments.worst_steps import StepAlbum
 
-    # A run takes long: what it cannot write to is found out first.
     for option, folder in (("--pictures", pictures), ("--json", _folder(json))):
         _make(option, folder)
     album = None if pictures is None else StepAlbum(pictures)
-    results = run_log_bench(cases, jobs=jobs, witness=album, on_progress=note)
+    return run_log_bench(cases, jobs=jobs, witness=album, on_progress=note)
+
+
+def deliver(document: dict[str, Any], table: str, json: Path | None) -> None:
+    """Print the table and write the document beside it; for `--json -`, print that alone."""
     if json is not None and _folder(json) is None:
-        print_json(to_json(results))
+        print_json(document)
         return
     if json is not None:
         try:
-            json.write_text(json_format.dumps(to_json(results), indent=2), encoding="utf-8")
+            json.write_text(json_format.dumps(document, indent=2), encoding="utf-8")
         except OSError as error:
             note(f"--json: {error}")
-    out.print(to_markdown(results), markup=False, soft_wrap=True)
+    out.print(table, markup=False, soft_wrap=True)
 
 
 def _folder(json: Path | None) -> Path | None:
