@@ -118,6 +118,22 @@ def test_status_and_replay_work_from_the_shell(
     assert picture.stat().st_size > 200
 
 
+def test_the_thesis_s_path_runs_through_the_service_with_either_matcher(
+    service: ChildService, tmp_path: Path
+) -> None:
+    options = ["closed-path", "--quick", "--url", service.url, "--json", "-o", str(tmp_path)]
+    done = CliRunner().invoke(app, ["experiment", *options])
+    assert done.exit_code == 0, done.output
+    report = json.loads(done.stdout)
+    for matcher in ("thesis", "default"):
+        found = report["matchers"][matcher]
+        assert (found["components"], found["placed"]) == (1, found["scans"])
+        assert found["error_from_first_max"] < {"thesis": 0.08, "default": 0.03}[matcher]
+        assert found["map_lines"] > 5
+    assert report["matchers"]["thesis"] != report["matchers"]["default"]
+    assert (tmp_path / "closed-path-served-map.png").stat().st_size > 1000
+
+
 def test_the_outbox_rides_out_the_death_of_the_service(
     service: ChildService, drive: list[SimulatedScan], tmp_path: Path
 ) -> None:

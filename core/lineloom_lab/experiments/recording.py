@@ -55,7 +55,8 @@ def closed_path(seed: int, scans: int = CLOSED_PATH_SCANS, share: float = 1.0) -
     drive = closed_drive(world)
     count = max(2, round(share * (scans - 1)) + 1)
     way = np.linspace(0.0, drive.length_m * (count - 1) / (scans - 1), count)
-    return _record(world, [drive.pose_at(s / _SPEED) for s in way.tolist()], seed, float(way[-1]))
+    stamps = (way / _SPEED).tolist()
+    return _record(world, [drive.pose_at(t) for t in stamps], stamps, seed, float(way[-1]))
 
 
 def closed_drive(world: World) -> Drive:
@@ -78,12 +79,17 @@ def straight_run(seed: int, scans: int = STRAIGHT_RUN_SCANS) -> Recording:
     """Drive 18.65 m straight to the intersection of two walls, without turning (§6.3.2)."""
     first = -(STRAIGHT_RUN_M + _STOP_BEFORE_CORNER_M)
     way = np.linspace(first, first + STRAIGHT_RUN_M, scans)
-    return _record(wall_corner(), [Pose(x, 0.0, 0.0) for x in way.tolist()], seed, STRAIGHT_RUN_M)
+    stamps = ((way - first) / _SPEED).tolist()
+    poses = [Pose(x, 0.0, 0.0) for x in way.tolist()]
+    return _record(wall_corner(), poses, stamps, seed, STRAIGHT_RUN_M)
 
 
-def _record(world: World, poses: list[Pose], seed: int, length: float) -> Recording:
+def _record(
+    world: World, poses: list[Pose], stamps: list[float], seed: int, length: float
+) -> Recording:
     lidar, rng = sick_lms200(), np.random.default_rng(seed)
     scans = tuple(
-        lidar.scan(world, pose, rng, stamp=i / lidar.rate_hz, seq=i) for i, pose in enumerate(poses)
+        lidar.scan(world, pose, rng, stamp=stamp, seq=i)
+        for i, (pose, stamp) in enumerate(zip(poses, stamps, strict=True))
     )
     return Recording(world, scans, tuple(poses), length)

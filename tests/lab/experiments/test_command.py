@@ -43,6 +43,13 @@ def test_a_wrong_name_lists_the_right_ones() -> None:
     assert run().exit_code == 2
 
 
+def test_only_the_closed_path_runs_through_a_service() -> None:
+    refused = run("timing", "--quick", "--url", "http://127.0.0.1:9")
+    assert refused.exit_code == 2
+    assert "closed-path and sparse-path do" in refused.stderr
+    assert run("sparse-path", "--scans", "40").exit_code == 2
+
+
 def test_missing_data_is_said_plainly(tmp_path: Path) -> None:
     result = run("real-scans", "--quick", "--data", tmp_path)
     assert result.exit_code == 1

@@ -11,6 +11,7 @@ import typer
 from lineloom.cli import options
 from lineloom.cli.console import note, out, print_json
 from lineloom.cli.failure import CommandError, Exit
+from lineloom.cli.served_experiment import Service
 
 if TYPE_CHECKING:
     from lineloom_lab.experiments import Experiment, Report, Settings
@@ -58,6 +59,18 @@ Data = Annotated[
     ),
 ]
 
+Url = Annotated[
+    str | None,
+    typer.Option(
+        metavar="URL",
+        help="Run closed-path or sparse-path through the service at this address.",
+    ),
+]
+Scans = Annotated[
+    int | None,
+    typer.Option(min=2, max=20_000, metavar="N", help="With --url: so many scans along the path."),
+]
+
 
 def experiment(
     name: ExperimentName = None,
@@ -67,6 +80,10 @@ def experiment(
     quick: Quick = False,
     matcher: Matcher = MatcherChoice.BOTH,
     data: Data = None,
+    url: Url = None,
+    token: options.Token = None,
+    scans: Scans = None,
+    timeout: options.Timeout = options.DEFAULT_TIMEOUT,
     json: options.Json = False,
 ) -> None:
     """Run an experiment of the thesis's chapter 6 again, and draw its figures.
@@ -75,19 +92,26 @@ def experiment(
     the text gives; the report says what differs from the printed figures, and why. The longest
     run takes under a minute.
 
+    With --url the path is posted to a running service instead, once for each value of the mapper's
+    parameter `matcher`, to new sites, and what their trajectories and maps have come to is shown.
+
     \b
     Example:
       lineloom experiment --list
       lineloom experiment sparse-path --output out/sparse
+      lineloom experiment sparse-path --url http://localhost:8765 --scans 90
       lineloom experiment all --quick --seed 3 --matcher thesis --json
     """
     if listing:
         _list()
         return
     settings = _settings(seed, quick, matcher, data)
+    service = None if url is None else Service(url, token, timeout, scans)
+    if service is None and scans is not None:
+        raise CommandError("--scans goes with --url", Exit.USAGE)
     reports = []
     for chosen in _chosen(name):
-        report = _report(chosen, settings, name == "all")
+        report = _report(chosen, settings, name == "all", service)
         if report is not None:
             reports.append(report)
             if output is not None:
@@ -130,10 +154,14 @@ def _chosen(name: str | None) -> tuple[Experiment, ...]:
         raise CommandError(str(error), Exit.USAGE) from None
 
 
-def _report(chosen: Experiment, settings: Settings, one_of_many: bool) -> Report | None:
+def _report(
+    chosen: Experiment, settings: Settings, one_of_many: bool, service: Service | None
+) -> Report | None:
     """Run one experiment; where its data is missing, all others still run."""
     from lineloom_lab.experiments import MissingDataError
 
+    if service is not None:
+        return service.run(chosen.name, settings)
     note(f"{chosen.name}: {chosen.about} …")
     try:
         return chosen.run(settings)
