@@ -7,11 +7,12 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[3]
 PACKAGE = ROOT / "core" / "lineloom_core"
+LAB = ROOT / "core" / "lineloom_lab"
 THESIS = PACKAGE / "matching" / "thesis"
 TEXT = (ROOT / "core" / "docs" / "thesis.md").read_text(encoding="utf-8")
 SOURCE = "\n".join(
     file.read_text(encoding="utf-8")
-    for folder in (THESIS, PACKAGE / "evaluation", PACKAGE / "simulation", PACKAGE / "scan")
+    for folder in (THESIS, LAB / "evaluation", LAB / "simulation", PACKAGE / "scan")
     for file in sorted(folder.glob("*.py"))
 )
 TESTS = "\n".join(
@@ -23,7 +24,7 @@ QUOTED = re.findall(r"`([^`]+)`", TEXT)
 
 def test_every_file_it_names_exists() -> None:
     files = {q for q in QUOTED if q.endswith(".py")}
-    homes = (THESIS, PACKAGE, Path(__file__).parent, ROOT)
+    homes = (THESIS, PACKAGE, LAB, Path(__file__).parent, ROOT)
     missing = sorted(f for f in files if not any((home / f).exists() for home in homes))
     assert not missing
 
