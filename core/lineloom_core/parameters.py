@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any, TypeVar
 
@@ -15,12 +16,12 @@ _BOUNDS = {"share": (0.0, 1.0), "rad": (0.0, math.pi), "m": (0.0, 1000.0), "s": 
 
 
 class ParameterError(ValueError):
-    """A parameter that is unknown or cannot be so. name: its dotted name. reason: why not."""
+    """Parameters that are unknown or cannot be so. wrong: why not, by dotted name."""
 
-    def __init__(self, name: str, reason: str) -> None:
-        super().__init__(f"{name}: {reason}" if name else reason)
-        self.name = name
-        self.reason = reason
+    def __init__(self, wrong: Mapping[str, str]) -> None:
+        said = (f"{name}: {reason}" if name else reason for name, reason in wrong.items())
+        super().__init__("; ".join(said))
+        self.wrong = wrong
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,14 +42,12 @@ class Parameter:
     def checked(self, name: str, value: object) -> float:
         """Return a value for it. Raises ParameterError."""
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise ParameterError(name, f"has to be a number, not {value!r}")
+            raise ParameterError({name: f"has to be a number, not {value!r}"})
         if not self.least <= value <= self.most:  # nor is NaN
-            allowed = f"from {self.least:g} to {self.most:g}"
-            raise ParameterError(
-                name, f"has to be {allowed} {self.unit}".rstrip() + f", not {value:g}"
-            )
+            allowed = f"from {self.least:g} to {self.most:g} {self.unit}".rstrip()
+            raise ParameterError({name: f"has to be {allowed}, not {value:g}"})
         if self.whole and value != int(value):
-            raise ParameterError(name, f"has to be a whole number, not {value:g}")
+            raise ParameterError({name: f"has to be a whole number, not {value:g}"})
         return int(value) if self.whole else float(value)
 
 
@@ -64,7 +63,7 @@ class Choice:
     def checked(self, name: str, value: object) -> str:
         """Return a value for it. Raises ParameterError."""
         if not isinstance(value, str) or value not in self.choices:
-            raise ParameterError(name, f"has to be {' or '.join(self.choices)}, not {value!r}")
+            raise ParameterError({name: f"has to be {' or '.join(self.choices)}, not {value!r}"})
         return value
 
 
@@ -112,25 +111,42 @@ def values(config: Any) -> dict[str, Any]:
     }
 
 
-def with_values(config: T, changes: Mapping[str, Any]) -> T:
-    """Return the config with these values, nested, in place of its own. Raises ParameterError."""
-    changed: T = _changed(config, effective(config), changes, "")
-    return changed
+def with_values(config: T, changes: Mapping[str, Any]) -> tuple[T, dict[str, str]]:
+    """Return the config with these values, nested, in place of its own, and what is wrong.
+
+    What is unknown or cannot be so is left out of the config, and told with the reason by its
+    dotted name.
+    """
+    wrong: dict[str, str] = {}
+    changed: T = _changed(config, effective(config), changes, "", wrong)
+    return changed, wrong
 
 
-def _changed(config: Any, known: dict[str, Any], changes: Any, above: str) -> Any:
+def _changed(
+    config: Any, known: dict[str, Any], changes: Any, above: str, wrong: dict[str, str]
+) -> Any:
     if not isinstance(changes, Mapping):
-        raise ParameterError(above, f"has to hold parameters by name, not {changes!r}")
+        wrong[above] = f"has to hold parameters by name, not {changes!r}"
+        return config
     new: dict[str, Any] = {}
     for key, value in changes.items():
         name = f"{above}.{key}" if above else str(key)
         if key not in known:
-            raise ParameterError(name, "is not a parameter")
-        if isinstance(known[key], Parameter | Choice):
-            new[key] = known[key].checked(name, value)
+            wrong[name] = "is not a parameter"
+        elif isinstance(known[key], Parameter | Choice):
+            with _noting(wrong):
+                new[key] = known[key].checked(name, value)
         else:
-            new[key] = _changed(getattr(config, key), known[key], value, name)
+            new[key] = _changed(getattr(config, key), known[key], value, name, wrong)
     return replace(config, **new)
+
+
+@contextmanager
+def _noting(wrong: dict[str, str]) -> Iterator[None]:
+    try:
+        yield
+    except ParameterError as error:
+        wrong.update(error.wrong)
 
 
 def by_name(tree: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:

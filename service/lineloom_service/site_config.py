@@ -65,8 +65,9 @@ def _known(site: str, own: Mapping[str, Any], base: MapperConfig) -> dict[str, A
         try:
             config_from(left, base)
         except ParameterError as error:
-            _LOG.warning("site %s: a parameter of its own is left out: %s", site, error)
-            _remove(left, error.name)
+            _LOG.warning("site %s: of its own parameters is left out: %s", site, error)
+            for name in error.wrong:
+                _remove(left, name)
         else:
             return left
 
@@ -77,5 +78,5 @@ def _remove(tree: dict[str, Any], name: str) -> None:
         _remove(tree[part], rest)
     elif part in tree:
         del tree[part]
-    else:  # of two that contradict each other, it is the other that is its own
+    else:  # a name with a dot in it, which no PUT has taken
         tree.clear()

@@ -119,3 +119,13 @@ async def test_what_cannot_be_is_named_and_nothing_is_taken(
     assert error["pointer"] == where
     assert reason in error["reason"]
     assert await service.store.site("refused") is None
+
+
+async def test_all_that_is_wrong_in_a_body_is_named(client: httpx.AsyncClient) -> None:
+    body = {"join": {"least_sett": 3, "least_set": 0, "lead": 2}, "chapter": "many"}
+    problem = expect_problem(
+        await client.put("/v1/sites/refused/config", json=body), 422, "invalid-body"
+    )
+    named = ["/join/least_sett", "/join/least_set", "/chapter"]
+    assert [error["pointer"] for error in problem["errors"]] == named
+    assert problem["detail"].endswith("(and 2 more)")

@@ -66,10 +66,34 @@ def test_what_is_not_given_is_the_base_s() -> None:
         ({"matcher": "karto"}, "matcher", "lineloom or thesis, not 'karto'"),
         ({"matcher": 3}, "matcher", "lineloom or thesis, not 3"),
         ({"persistence": {"near": 0.5}}, "persistence.near", "persistence.far only 0.3"),
+        ({"persistence": {"far": 0.1}}, "persistence.far", "persistence.near already 0.15"),
     ],
 )
 def test_what_cannot_be_is_refused_by_name(given: dict[str, Any], name: str, reason: str) -> None:
     with pytest.raises(ParameterError, match=reason) as refused:
         config_from(given)
-    assert refused.value.name == name
+    assert list(refused.value.wrong) == [name]
     assert name in str(refused.value)
+
+
+def test_all_that_is_wrong_is_named() -> None:
+    given = {
+        "join": {"least_sett": 3, "least_set": 4, "lead": 0},
+        "chapter": 8.5,
+        "persistence": {"near": 0.5},
+        "recognition": {"cell": "wide", "half": 0.5},
+        "tracker": 3,
+    }
+    with pytest.raises(ParameterError) as refused:
+        config_from(given)
+    assert {name: reason.split()[0] for name, reason in refused.value.wrong.items()} == {
+        "join.least_sett": "is",
+        "join.lead": "has",
+        "chapter": "has",
+        "recognition.cell": "has",
+        "tracker": "has",
+        "persistence.near": "is",
+    }
+    assert all(
+        f"{name}: {reason}" in str(refused.value) for name, reason in refused.value.wrong.items()
+    )

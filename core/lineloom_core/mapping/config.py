@@ -11,7 +11,7 @@ from lineloom_core.codec import storable
 from lineloom_core.features import ExtractionConfig
 from lineloom_core.fusion import FusionConfig
 from lineloom_core.fusion.persistence import PersistenceConfig
-from lineloom_core.parameters import ParameterError, choice, parameter, with_values
+from lineloom_core.parameters import ParameterError, by_name, choice, parameter, with_values
 from lineloom_core.places.recognition import RecognitionConfig
 
 
@@ -266,13 +266,20 @@ _ORDERED = (
 def config_from(given: Mapping[str, Any], base: MapperConfig | None = None) -> MapperConfig:
     """Return `base` (the defaults) with the parameters that are given, nested by name.
 
-    Raises ParameterError, which names the first that is unknown or that cannot be so.
+    Raises ParameterError, which names all that are unknown or that cannot be so.
     """
-    config = with_values(base or MapperConfig(), given)
+    config, wrong = with_values(base or MapperConfig(), given)
+    named = dict(by_name(given))
     for less, more in _ORDERED:
         low, high = _get(config, less), _get(config, more)
-        if low > high:
-            raise ParameterError(less, f"is {low:g}, and {more} only {high:g}")
+        if low <= high or {less, more} & wrong.keys():
+            continue
+        if less in named:
+            wrong[less] = f"is {low:g}, and {more} only {high:g}"
+        else:
+            wrong[more] = f"is {high:g}, and {less} already {low:g}"
+    if wrong:
+        raise ParameterError(wrong)
     return config
 
 

@@ -46,7 +46,7 @@ async def put_config(name: SiteName, request: Request, service: ServiceDep) -> R
 
     The body names them nested, e.g. `{"join": {"least_set": 4}}`, and replaces what a PUT before
     named: others have the value of the service's `--mapper-config` file, else the default. Nothing
-    is taken of a body with a parameter that is unknown or cannot be so.
+    is taken of a body with parameters that are unknown or cannot be so; all of them are named.
     """
     body = await read_body(request, service.settings)
     if not isinstance(body.value, dict):
@@ -54,8 +54,12 @@ async def put_config(name: SiteName, request: Request, service: ServiceDep) -> R
     try:
         order = ordered(body.value, service.settings.mapper)
     except ParameterError as error:
-        where = pointer(*error.name.split("."))
-        raise invalid_body([wire.FieldError(pointer=where, reason=error.reason)]) from None
+        raise invalid_body(
+            [
+                wire.FieldError(pointer=pointer(*name.split(".")), reason=reason)
+                for name, reason in error.wrong.items()
+            ]
+        ) from None
     before = await service.store.site(name)
     was = _now(before, service.settings.mapper)
     if before is None or before.config is not None or order != was:
