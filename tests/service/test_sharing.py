@@ -227,6 +227,28 @@ async def test_a_view_that_somebody_put_into_the_database_is_told_and_ignored(
         assert await b.map() == await a.map() == await _undisturbed(tmp_path, 20)
 
 
+async def test_any_process_tells_of_the_map_that_one_makes_anew(
+    url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FAKE_MAPPER_SECONDS", "0.04")
+    async with process(url, tmp_path, snapshot_every=10, chunk=5) as a, process(url, tmp_path) as b:
+        await b.post(range(60))
+        await b.idle()
+        assert (await b.get("/v1/sites/s"))["remaking"] is None
+        put = await b.client.put("/v1/sites/s/config", json={"join": {"least_set": 5}})
+        assert put.status_code == 200, put.text
+
+        async def told() -> dict[str, Any]:
+            site = await b.get("/v1/sites/s")
+            assert (await b.get("/v1/sites"))["sites"][0].keys() == site.keys()
+            return dict(site["remaking"] or {})
+
+        found = await until(told, lambda made: made.get("position", 0) >= 10)
+        assert (found["of"], found["why"]) == (61, "other parameters")
+        await until(told, lambda made: not made)
+        assert (await a.get("/v1/sites/s/config/difference"))["type"] == "remade"
+
+
 async def test_a_site_deleted_through_one_is_gone_for_all(url: str, tmp_path: Path) -> None:
     async with process(url, tmp_path) as a, process(url, tmp_path) as b:
         await a.post(range(10))

@@ -19,6 +19,7 @@ class FakeSite:
         self.version = 40
         self.joined = False
         self.trouble: str | None = None
+        self.remaking: dict[str, Any] | None = None
         self.plan: dict[str, dict[str, float]] | None = None
         """T_plan_map of the components that have a place in the floor plan."""
         self.constraints = [_candidate("p5-17"), _candidate("p3-15"), _rejected("p1-20")]
@@ -71,6 +72,7 @@ class FakeSite:
             "merged_into": {"c1": "c0"} if self.joined else {},
             "constraints": {"rendezvous": counts},
             "trouble": self.trouble,
+            "remaking": self.remaking,
         }
 
     def told(self) -> dict[str, dict[str, Any]]:

@@ -37,6 +37,7 @@ def test_axe_finds_nothing_to_complain_of(
 ) -> None:
     page = new_page(color_scheme=scheme, bypass_csp=True)
     fake.site.trouble = "its log cannot be read"
+    fake.site.remaking = {"position": 3, "of": 40, "why": "other parameters"}
     open_viewer(page, fake.url, SITE)
     expect(page.get_by_role("alert")).to_be_visible()
     assert page.evaluate("() => document.documentElement.dataset.theme") == scheme

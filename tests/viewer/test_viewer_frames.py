@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import pytest
@@ -92,6 +93,20 @@ def test_a_site_in_trouble_says_why(fake: FakeServer, page: Page) -> None:
     fake.site.version += 1
     expect(page.get_by_role("alert")).to_have_text("its log cannot be read")
     expect(page.locator("#status")).to_contain_text("Not mapped")
+
+
+def test_a_map_that_is_made_anew_is_told_of_until_it_is_shown(fake: FakeServer, page: Page) -> None:
+    open_viewer(page, fake.url, SITE)
+    badge = page.locator("#status .remaking")
+    expect(badge).to_have_count(0)
+    fake.site.remaking = {"position": 300, "of": 1200, "why": "other parameters"}
+    fake.site.version += 1
+    expect(badge).to_have_text("New map 25 %")
+    expect(badge).to_have_attribute("title", re.compile("300 of 1,200 entries.*other parameters"))
+    fake.site.remaking = {"position": 1199, "of": 1200, "why": "other parameters"}
+    expect(badge).to_have_text("New map 99 %")  # no event tells of that
+    fake.site.remaking = None
+    expect(badge).to_have_count(0)
 
 
 def test_what_is_wrong_with_a_robot_is_seen_without_a_click(fake: FakeServer, page: Page) -> None:

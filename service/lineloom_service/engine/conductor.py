@@ -13,7 +13,12 @@ from typing import Any
 from lineloom_core.mapping.answers.site_view import SiteView
 
 from lineloom_service.engine.forwarding import Forwarding
-from lineloom_service.engine.hosted_site import HostedSite, Means, Remaking
+from lineloom_service.engine.hosted_site import (
+    HostedSite,
+    Means,
+    Remaking,
+    remaking_elsewhere,
+)
 from lineloom_service.engine.making import site_of
 from lineloom_service.engine.protocol import Engine, Recorder, ViewListener, WorkerDiedError
 from lineloom_service.engine.published import NOTHING, Published
@@ -128,9 +133,15 @@ class Conductor:
         self._listeners.append(listener)
 
     def remaking(self, site_id: int) -> Remaking | None:
-        """Return how far the map is that will be shown instead; None where none is made."""
+        """Return how far the map is that will be shown instead; None where none is made here."""
         site = self._sites.get(site_id)
         return None if site is None else site.remaking
+
+    async def remaking_anywhere(self, record: SiteRecord) -> Remaking | None:
+        """Return the same, whichever process makes it: of another's, as far as it is saved."""
+        if self._mapping or not self._store.shared:
+            return self.remaking(record.id)
+        return await remaking_elsewhere(self._store, record)
 
     async def reached(self, site_id: int, position: int, within_s: float) -> bool:
         """Wait until the published view holds the entry at `position`; False if it takes longer."""

@@ -19,7 +19,9 @@ from lineloom_service.engine.protocol import Engine, Recorder, Remade, WorkerDie
 from lineloom_service.engine.published import NOTHING, Published
 from lineloom_service.engine.site_runner import Pace, SiteRunner
 from lineloom_service.store.protocol import Store
+from lineloom_service.store.reads import read_last_events
 from lineloom_service.store.records import SiteRecord, StoreError
+from lineloom_service.store.snapshots import saved_position
 
 _LOG = logging.getLogger(__name__)
 _AGAIN_S = 1.0
@@ -32,6 +34,16 @@ class Remaking:
     position: int
     of: int
     why: str
+
+
+async def remaking_elsewhere(store: Store, record: SiteRecord) -> Remaking | None:
+    """Return the same as far as the store has it, for a process that does not map: it is saved."""
+    told = None if record.config is None else await store.read(read_last_events, record.id)
+    ordered = Making.of(record.config)
+    if told is None or told.producer == ordered.id:
+        return None
+    saved = await store.read(saved_position, record.id, ordered.id)
+    return Remaking(saved, record.position, ordered.why_not(told.producer))
 
 
 @dataclass(frozen=True, slots=True)

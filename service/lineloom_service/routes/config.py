@@ -35,7 +35,7 @@ _FIRST = "they hold from the first scan on"
 @router.get("/v1/sites/{site}/config", response_model=wire.SiteConfig)
 async def get_config(site: KnownSite, service: ServiceDep) -> Response:
     """Return every parameter that a site's map is made with, with unit, meaning and default."""
-    return answer(_config(site, service))
+    return answer(await _config(site, service))
 
 
 @router.put(
@@ -66,7 +66,8 @@ async def put_config(name: SiteName, request: Request, service: ServiceDep) -> R
         await service.store.write(configure, name, order, make=True)
     after = await known_site(name, service)
     effect = _NOTHING if order.digest == was.digest else _ANEW if after.accepted else _FIRST
-    return answer(_config(after, service).model_copy(update={"effect": effect}))
+    config = await _config(after, service)
+    return answer(config.model_copy(update={"effect": effect}))
 
 
 @router.get("/v1/sites/{site}/config/difference", response_model=wire.RemadeEvent)
@@ -84,7 +85,7 @@ def _now(site: SiteRecord | None, base: MapperConfig) -> ConfigEntry:
     return replace(site.config, position=0, since=0)
 
 
-def _config(site: SiteRecord, service: Service) -> wire.SiteConfig:
+async def _config(site: SiteRecord, service: Service) -> wire.SiteConfig:
     entry = site.config
     config = in_force(site, service.settings.mapper)
     return wire.SiteConfig(
@@ -93,7 +94,7 @@ def _config(site: SiteRecord, service: Service) -> wire.SiteConfig:
         own={} if entry is None else dict(entry.own),
         position=None if entry is None else entry.position,
         digest=ordered({}, config).digest if entry is None else entry.digest,
-        remaking=to_remaking(service.conductor.remaking(site.id)),
+        remaking=to_remaking(await service.conductor.remaking_anywhere(site)),
     )
 
 

@@ -19,7 +19,7 @@ router = APIRouter(tags=["sites"])
 async def list_sites(service: ServiceDep) -> Response:
     """Return all sites."""
     records = await service.store.sites()
-    sites = [_site(record, service) for record in records]
+    sites = [await _site(record, service) for record in records]
     return answer(wire.SiteList(sites=sites))
 
 
@@ -29,7 +29,7 @@ async def get_site(site: KnownSite, service: ServiceDep) -> Response:
 
     `trouble`: why it is not mapped just now, such as a log that cannot be read; else null.
     """
-    return answer(_site(site, service))
+    return answer(await _site(site, service))
 
 
 @router.delete("/v1/sites/{site}", status_code=204)
@@ -42,11 +42,11 @@ async def delete_site(site: KnownSite, service: ServiceDep) -> Response:
     return Response(status_code=204)
 
 
-def _site(record: SiteRecord, service: Service) -> wire.Site:
+async def _site(record: SiteRecord, service: Service) -> wire.Site:
     conductor = service.conductor
     return to_site(
         record,
         conductor.published(record.id),
         conductor.trouble(record.id),
-        to_remaking(conductor.remaking(record.id)),
+        to_remaking(await conductor.remaking_anywhere(record)),
     )

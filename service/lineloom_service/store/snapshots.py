@@ -80,6 +80,13 @@ def read_snapshot(connection: Connection, site_id: int, producer: str) -> Snapsh
     return None if row is None else SnapshotRecord(*row)
 
 
+def saved_position(connection: Connection, site_id: int, producer: str) -> int:
+    """Return how far the newest snapshot is that `producer` wrote; 0 without any."""
+    c = tables.snapshots.c
+    query = select(func.max(c.position)).where(c.site_id == site_id, c.producer == producer)
+    return connection.execute(query).scalar() or 0
+
+
 def read_chapter(connection: Connection, site_id: int, producer: str, number: int) -> bytes:
     """Return a chapter as it was saved. Raises ChapterLostError."""
     c = tables.chapters.c

@@ -8,7 +8,9 @@
  * @typedef {{id: string, robots: string[], keyframes: number}} ComponentAnswer
  * @typedef {{site: string, version: number, idle: boolean, scans: ScanCounts, robots: string[],
  *   components: ComponentAnswer[], merged_into: Object<string, string>,
- *   constraints: Object<string, Object<string, number>>, trouble?: string|null}} SiteAnswer
+ *   constraints: Object<string, Object<string, number>>, trouble?: string|null,
+ *   remaking?: RemakingAnswer|null}} SiteAnswer
+ * @typedef {{position: number, of: number, why: string}} RemakingAnswer
  *
  * @typedef {{robot: string, component: string|null, state: "starting"|"tracking"|"lost",
  *   pose: (Pose & {covariance: (number|null)[][]|null})|null, scans: ScanCounts,

@@ -37,6 +37,7 @@ export class SiteFeed {
     this._wake = () => {};
     this._failures = 0;
     this._streaming = false;
+    this._remaking = false;
     /** @type {EventStream|null} */
     this._stream = null;
     this._onVisible = () => document.hidden || this.refresh();
@@ -79,7 +80,8 @@ export class SiteFeed {
       const pause = this._pause(Math.min(Math.max(4 * took, LEAST_PAUSE_MS), MOST_PAUSE_MS));
       await Promise.race([this._listener.onShown(), this._pause(MOST_PAUSE_MS)]);
       await pause;
-      const idle = this._streaming ? WATCHDOG_MS : POLL_MS;
+      // Of a map that is being made no event tells.
+      const idle = this._streaming && !this._remaking ? WATCHDOG_MS : POLL_MS;
       if (this._due.wait > 0) await this._sleep(Math.min(this._due.wait, idle), false);
       if (this._due.wait > 0) this._due.robots();
     }
@@ -90,6 +92,7 @@ export class SiteFeed {
     if (this._stopped) return;
     this._listener.onConnection(this._streaming ? "live" : "polling", "");
     this._listener.onSite(site);
+    this._remaking = Boolean(site.remaking);
     // Without events, only the version tells that something has changed.
     const changed = site.version !== this._version;
     if (site.version < this._version) this._reader.forget();

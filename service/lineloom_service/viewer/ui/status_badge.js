@@ -55,6 +55,15 @@ export class StatusBadge {
       h("span", { className: "dot", "aria-hidden": "true" }),
       h("strong", {}, words),
       h("span", { className: "detail" }, current ? version : detail),
+      current ? remakingBadge(this._site?.remaking) : null,
     );
   }
+}
+
+/** Say how far the map is that will be shown instead. @param {import("../net/contract.js").RemakingAnswer|null} [made] */
+function remakingBadge(made) {
+  if (!made) return null;
+  const share = Math.floor((100 * made.position) / Math.max(made.of, 1));
+  const title = `The map is made anew, beside this one: ${count(made.position)} of ${count(made.of)} entries. Why: ${made.why}`;
+  return h("span", { className: "remaking", title }, `New map ${share} %`);
 }
