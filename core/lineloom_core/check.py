@@ -6,6 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from lineloom_core.codec import storable
 
 Figures = Mapping[str, float]
@@ -46,16 +49,24 @@ class Check:
 
     def limit(self, config: object, figures: Figures) -> Limit:
         """What the figure is held to under these parameters; it must be there."""
-        parameter = self.at_least or self.at_most
-        if not parameter:
+        if not (self.at_least or self.at_most):
             return Limit(None, None, True, self.means, self.unit)
-        threshold = float(getattr(config, parameter))
-        if self.adjusted is not None:
-            threshold = self.adjusted(config, threshold, figures)
+        threshold = self._threshold(config, figures)
         value = figures[self.name]
         if self.at_least:
             return Limit(threshold, None, value >= threshold, self.means, self.unit)
         return Limit(None, threshold, value <= threshold, self.means, self.unit)
+
+    def fails(self, config: object, values: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Of many figures at once, whether each speaks against; no other figure may adjust it."""
+        threshold = self._threshold(config, {})
+        return values < threshold if self.at_least else values > threshold
+
+    def _threshold(self, config: object, figures: Figures) -> float:
+        threshold = float(getattr(config, self.at_least or self.at_most))
+        if self.adjusted is None:
+            return threshold
+        return self.adjusted(config, threshold, figures)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,8 +87,16 @@ class Checks:
                 return row
         return None
 
+    def against_each(
+        self, config: object, figures: Mapping[str, NDArray[np.float64]]
+    ) -> NDArray[np.bool_]:
+        """The same for many at once, shape (n,): whether a check speaks against each."""
+        failing = [row.fails(config, figures[row.name]) for row in self.rows if row.name in figures]
+        against: NDArray[np.bool_] = np.any(failing, axis=0)
+        return against
+
     def objection(self, config: object, figures: Figures) -> str:
-        """The same in words; empty where nothing speaks against it."""
+        """What speaks against it in words; empty where nothing does."""
         row = self.against(config, figures)
         return "" if row is None else row.objection.format(figures[row.name])
 

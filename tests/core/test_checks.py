@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
+import numpy as np
 import pytest
 from lineloom_core.check import Check, Checks
 from lineloom_core.checks import (
@@ -102,6 +103,23 @@ def test_the_first_check_that_speaks_against_gives_the_reason() -> None:
     assert JOINED.objection(config, bad) == "another set of constraints says something else"
     worse = {**good, "set_missing": 0.05}
     assert "missing for the other (5.0%)" in JOINED.objection(config, worse)
+
+
+def test_many_at_once_are_judged_as_each_alone() -> None:
+    config = MapperConfig()
+    rng = np.random.default_rng(3)
+    strain = {"strain_m": rng.uniform(0.0, 1.0, 300), "strain_rad": rng.uniform(0.0, 0.24, 300)}
+    common = {"fit": rng.uniform(0.3, 0.9, 300)}
+    for checks, part, columns in (
+        (DOUBTED, config.doubt, strain),
+        (NEAR_LOOP, config.near_loops, common),
+    ):
+        rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+        alone = [checks.against(part, row) is not None for row in rows]
+        assert checks.against_each(part, columns).tolist() == alone
+        assert 50 < sum(alone) < 250
+    at_the_limit = {"strain_m": np.array([config.doubt.most_strain])}
+    assert DOUBTED.against_each(config.doubt, at_the_limit).tolist() == [False]
 
 
 def test_a_step_is_held_to_more_after_a_gap_and_to_less_where_the_lidar_is_noisy() -> None:

@@ -105,7 +105,9 @@ class WideLoopConfig:
     One that corrects the graph by less than small_step and small_turn needs no other.
     """
 
-    most_sigmas: float = parameter(3.0, "σ", "of drift that a loop may correct", 0.01)
+    most_sigmas: float = parameter(
+        3.0, "σ", "of drift that a loop may correct, so places are looked for within it", 0.01
+    )
     least_agreeing: int = parameter(1, "constraints", "others that correct the graph alike")
     slack: float = parameter(0.3, "m", "between two that do, besides the drift in between")
     turn: float = parameter(0.1, "rad", "between two that do")

@@ -225,4 +225,4 @@ def test_the_noise_figure_follows_but_no_single_scan_rules() -> None:
 def test_a_way_that_ends_far_off_is_less_sure_across() -> None:
     near, far = (way_drift((1e-4, 1e-5), 20.0, straight) for straight in (1.0, 20.0))
     assert far[2, 2] == near[2, 2] == pytest.approx(2e-4)
-    assert reach(far) > 2.0 * reach(near)
+    assert reach(far, 3.0) > 2.0 * reach(near, 3.0)

@@ -111,6 +111,6 @@ def way_drift(rates: tuple[float, float], way: float, straight: float) -> NDArra
     return np.diag([across, across, theta])
 
 
-def reach(covariance: NDArray[np.float64]) -> float:
-    """Three sigmas of the position's worst direction [m]."""
-    return 3.0 * math.sqrt(float(np.linalg.eigvalsh(covariance[:2, :2])[1]))
+def reach(covariance: NDArray[np.float64], sigmas: float) -> float:
+    """So many sigmas of the position's worst direction [m]."""
+    return sigmas * math.sqrt(float(np.linalg.eigvalsh(covariance[:2, :2])[1]))

@@ -67,7 +67,8 @@ def _worth_trying(site: SiteMap, place: Place) -> list[Place]:
         if tied or near:
             continue
         distance = site.pose(other.anchor).distance(site.pose(place.anchor))
-        if distance < 4.0 + reach(site.rough_drift(other.anchor, place.anchor)):
+        drift = site.rough_drift(other.anchor, place.anchor)
+        if distance < 4.0 + reach(drift, site.config.wide_loops.most_sigmas):
             chosen.append(other)
     return chosen
 

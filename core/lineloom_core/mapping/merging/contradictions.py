@@ -14,6 +14,7 @@ import itertools
 
 import numpy as np
 
+from lineloom_core.checks import DOUBTED
 from lineloom_core.mapping.belief.constraint import Constraint
 from lineloom_core.mapping.belief.refusals import is_approved
 from lineloom_core.mapping.belief.site_map import SiteMap
@@ -158,14 +159,18 @@ def _strained(site: SiteMap, place: Place) -> tuple[Constraint, ...]:
     root = site.component_root(place.anchor)
     if site.unsolved.get(root):
         return ()
-    errors, config = site.graph.errors(), site.config.doubt
-    off, turned = np.hypot(errors[:, 0], errors[:, 1]).tolist(), np.abs(errors[:, 2]).tolist()
-    edges = zip(site.graph.edges.values(), off, turned, strict=True)
+    errors = site.graph.errors()
+    off, turned = np.hypot(errors[:, 0], errors[:, 1]), np.abs(errors[:, 2])
+    doubted = DOUBTED.against_each(site.config.doubt, {"strain_m": off, "strain_rad": turned})
+    edges = list(site.graph.edges.values())
     return tuple(
-        withdrawn(site, site.constraints[edge.id], {"strain_m": m, "strain_rad": rad})
-        for edge, m, rad in edges
-        if edge.kind == "loop"
-        and (m > config.most_strain or rad > config.most_turn)  # as `DOUBTED`, for all loops fast
-        and site.component_root(edge.node_a) == root
-        and not is_approved(site, site.constraints[edge.id])
+        withdrawn(
+            site,
+            site.constraints[edges[i].id],
+            {"strain_m": float(off[i]), "strain_rad": float(turned[i])},
+        )
+        for i in np.flatnonzero(doubted)
+        if edges[i].kind == "loop"
+        and site.component_root(edges[i].node_a) == root
+        and not is_approved(site, site.constraints[edges[i].id])
     )

@@ -31,8 +31,10 @@ def _looks_like(site: SiteMap, place: Place, other: Place, need: float) -> bool:
     first, second = (other, place) if other.id < place.id else (place, other)
     known = site.pose(first.anchor).between(site.pose(second.anchor))
     table = site.memory.look_alikes(first, second)
+    sigmas = site.config.wide_loops.most_sigmas
     for drift in (site.rough_drift, site.drift):  # the second takes long and is seldom asked
-        slack = reach(drift(first.anchor, second.anchor)) if first is not second else 0.0
+        apart = first is not second
+        slack = reach(drift(first.anchor, second.anchor), sigmas) if apart else 0.0
         evidence = evidence_elsewhere(table, known, site.config.recognition, slack=slack)
         if evidence <= need:
             return False

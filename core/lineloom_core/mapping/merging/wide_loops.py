@@ -84,8 +84,8 @@ def _loops_agree(site: SiteMap, c: Constraint, o: Constraint) -> bool:
     off = (T_c @ at).between(T_o @ at)
     slack = (
         config.slack
-        + reach(site.drift(c.keyframe_a, o.keyframe_a))
-        + reach(site.drift(c.keyframe_b, o.keyframe_b))
+        + reach(site.drift(c.keyframe_a, o.keyframe_a), config.most_sigmas)
+        + reach(site.drift(c.keyframe_b, o.keyframe_b), config.most_sigmas)
     )
     return math.hypot(off.x, off.y) < slack and abs(angle_difference(off.theta, 0.0)) < config.turn
 
