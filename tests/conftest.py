@@ -7,7 +7,24 @@ from pathlib import Path
 
 import pytest
 
-SLOWEST_FIRST: tuple[str, ...] = ()
+SLOWEST_FIRST = (
+    "scenarios/test_real_logs_over_http.py",
+    "scenarios/test_real_logs_mapped.py",
+    "docs/test_docs_run.py",
+    "lab/evaluation/test_merge_bench.py",
+    "core/mapping/test_kidnapped.py",
+    "service/test_chapters.py",
+    "lab/evaluation/test_pair_bench.py",
+    "core/mapping/test_merging.py",
+    "lab/experiments/test_reports.py",
+    "core/mapping/test_thinning.py",
+    "service/test_upgrades.py",
+    "clients/cli/test_demo.py",
+    "core/kernels/test_never_stale.py",
+    "core/health/test_sensor_doctor.py",
+    "benchmarks/test_bench_rows.py",
+    "contract/test_schemathesis.py",
+)
 """Several processes share the files; what begins last should not take long."""
 
 _TOLD = 10

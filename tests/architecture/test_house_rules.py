@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.conftest import SLOWEST_FIRST
+
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("core/", "service/", "clients/")
 
@@ -183,3 +185,8 @@ def test_the_rules_bite() -> None:
     assert REGISTRY.search("--index" + "-url=x")
     assert REGISTRY.search("https://mirror.example/py" + "pi/simp" + "le/")
     assert not REGISTRY.search("numpy==2.4.0  # a simple pin")
+
+
+def test_the_files_that_begin_first_are_there() -> None:
+    assert len(SLOWEST_FIRST) > 5
+    assert [name for name in SLOWEST_FIRST if f"tests/{name}" not in committed()] == []
