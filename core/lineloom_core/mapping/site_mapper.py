@@ -34,7 +34,7 @@ from lineloom_core.mapping.belief.memory import Memory
 from lineloom_core.mapping.belief.rebuild import first_affected, rebuild
 from lineloom_core.mapping.belief.sameness import is_meant
 from lineloom_core.mapping.belief.site_map import SiteMap
-from lineloom_core.mapping.belief.standing import standing
+from lineloom_core.mapping.belief.standing import standing, unplaced_ends
 from lineloom_core.mapping.belief.verdicts import Verdicts
 from lineloom_core.mapping.changes import Changes
 from lineloom_core.mapping.config import MapperConfig
@@ -250,7 +250,17 @@ class SiteMapper:
             return self._find(constraint)
         found = self._find(constraint.constraint)
         places = self._config.places
-        return found or standing(constraint, self._history, self._robots, places)
+        found = found or standing(constraint, self._history, self._robots, places)
+        self._note_unmet(constraint, met=found is not None)
+        return found
+
+    def _note_unmet(self, claim: Claim, *, met: bool) -> None:
+        """Let the robots' health tell of what an operator says of scans that are in no map."""
+        for record in self._robots.values():
+            record.unmet.pop(claim.constraint, None)
+        for name in () if met else unplaced_ends(claim, self._history, self._robots):
+            if name.robot in self._robots:  # else it was forgotten since
+                self._robots[name.robot].unmet[claim.constraint] = name.session
 
     def _retracting(self, constraint: Constraint) -> Verdicts:
         gone = constraint.moved_to("retracted", "retracted by an operator", self._version)

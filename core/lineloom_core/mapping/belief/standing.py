@@ -47,6 +47,14 @@ def standing(
     )
 
 
+def unplaced_ends(
+    claim: Claim, history: History, robots: Mapping[str, RobotRecord]
+) -> list[ScanName]:
+    """The scans that a claim names and of whose session nothing is in the map."""
+    ends = (claim.scan_a, claim.scan_b)
+    return [name for name in ends if _anchored(name, history, robots, 0.0) is None]
+
+
 def _anchored(
     name: ScanName, history: History, robots: Mapping[str, RobotRecord], earlier: float
 ) -> tuple[int, Pose] | None:

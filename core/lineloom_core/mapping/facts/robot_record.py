@@ -41,6 +41,9 @@ class RobotRecord:
     doctor: SensorDoctor = field(default_factory=SensorDoctor)
     distrusted: str = ""
     """Why nothing of its session may be joined with other maps; empty where all is well."""
+    unmet: dict[str, str] = field(default_factory=dict)
+    """Constraints that an operator's word is about, and that bind nothing here: to the session
+    of its scans that has no keyframe."""
 
     def name_next(self, scan: Scan) -> ScanName:
         """The name of the scan that becomes the next keyframe."""
@@ -60,8 +63,14 @@ class RobotRecord:
     @property
     def health(self) -> tuple[str, ...]:
         """What an operator should know, in plain words, the worst first."""
-        findings = tuple(str(finding) for finding in self.doctor.findings())
-        if not self.distrusted:
-            return findings
-        apart = f"not-joined: this robot's map stays by itself because of {self.distrusted}"
-        return (*findings, apart)
+        findings = [str(finding) for finding in self.doctor.findings()]
+        if self.distrusted:
+            findings.append(
+                f"not-joined: this robot's map stays by itself because of {self.distrusted}"
+            )
+        findings += [
+            f"no-effect: what was said of constraint {name} changes nothing: no keyframe was made "
+            f"of its session {session!r}"
+            for name, session in self.unmet.items()
+        ]
+        return tuple(findings)
