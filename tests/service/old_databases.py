@@ -13,7 +13,7 @@ from lineloom_service.store.sqlite_engine import sqlite_engine
 Rows = dict[str, list[dict[str, Any]]]
 """Table -> its rows."""
 
-REVISIONS = ("0001", "0002", "0003", "0004", "0005", "0006", "0007", "0008")
+REVISIONS = ("0001", "0002", "0003", "0004", "0005", "0006", "0007", "0008", "0009")
 
 SCANS = [NewScan("0", seq, b"scan %d" % seq) for seq in (0, 1, 2, 4)]
 
@@ -69,6 +69,7 @@ _ADDED: dict[str, Rows] = {
     "0008": {
         "chapters": [{"site_id": 1, "producer": "v1", "number": 0, "crc": 1, "data": b"c"}],
     },
+    "0009": {},
 }
 
 

@@ -28,6 +28,8 @@ from tests.service.databases import POSTGRESQL, fresh_database
 from tests.service.old_databases import REVISIONS, Rows, make_old, make_old_file, read_all
 
 OLDER = REVISIONS[:-1]
+HALVED = OLDER[:-1]
+"""Those that earlier versions upgraded further, and could leave halfway."""
 
 Contents = dict[str, tuple[list[str], list[tuple[object, ...]]]]
 """Table -> its columns and its rows."""
@@ -184,7 +186,7 @@ def _half_upgraded(directory: Path, revision: str | None) -> Iterator[Path]:
             return
 
 
-@pytest.mark.parametrize("revision", [None, *OLDER])
+@pytest.mark.parametrize("revision", [None, *HALVED])
 async def test_what_an_earlier_version_left_half_upgraded_is_completed(
     tmp_path: Path, revision: str | None
 ) -> None:
@@ -291,7 +293,8 @@ async def test_postgresql_is_upgraded_as_a_whole_or_not_at_all(revision: str | N
                 assert await _tables(url) == there
             finally:
                 await database.close()
-        assert number > 2 * (len(REVISIONS) - REVISIONS.index(revision or "0001"))
+        # Revision 0009 changes no table: it takes but one statement.
+        assert number >= 2 * (len(REVISIONS) - REVISIONS.index(revision or "0001"))
         now = await _state(url)
         assert now[0] == REVISIONS[-1]
         for table, rows in before[1].items():
