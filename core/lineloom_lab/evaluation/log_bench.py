@@ -27,6 +27,7 @@ from lineloom_lab.evaluation.log_bench_cases import Setting
 from lineloom_lab.evaluation.log_bench_clocks import TRUE_CLOCK, with_clock
 from lineloom_lab.evaluation.log_bench_judge import LogFigures, PlacedRobot, judge
 from lineloom_lab.evaluation.log_bench_log import BenchLog, Half, LogSource, Recording, Trust
+from lineloom_lab.evaluation.log_bench_rigid import rigid_figures
 from lineloom_lab.evaluation.log_bench_sameness import same_share
 from lineloom_lab.evaluation.log_bench_steps import StepFigures, step_figures
 
@@ -50,7 +51,9 @@ class LogResult:
     """What became of a log.
 
     cpu_ms: mapping, per scan. share_same: of what the same run under the true clock placed, what
-    lies likewise here; None without such a run. unreadable: why there is nothing else.
+    lies likewise here; None without such a run. share_rigid: of two lidars on one robot, where both
+    are in one component, what lies as they are mounted; None elsewhere. unreadable: why there is
+    nothing else.
     """
 
     log: str
@@ -61,6 +64,7 @@ class LogResult:
     steps: StepFigures | None
     cpu_ms: float
     share_same: float | None = None
+    share_rigid: float | None = None
     unreadable: str | None = None
     placed: tuple[PlacedRobot, ...] = field(default=(), compare=False, repr=False)
 
@@ -100,6 +104,9 @@ def run_case(
     placed = [_placed(robot, view) for robot in robots]
     if witness is not None:
         witness(case, robots, placed)
+    rigid = None
+    if log.rigid is not None and case.setting.clock == TRUE_CLOCK:
+        rigid = rigid_figures(robots, placed, log.rigid).share_agreeing
     return LogResult(
         case.source.name,
         case.source.half,
@@ -108,6 +115,7 @@ def run_case(
         judge(placed),
         step_figures(placed),
         1e3 * cpu_s / sum(len(robot.scans) for robot in robots),
+        share_rigid=rigid,
         placed=tuple(placed),
     )
 

@@ -24,6 +24,7 @@ from lineloom_lab.evaluation.log_bench_log import (
     BenchLog,
     Half,
     Recording,
+    RigidPair,
     Trust,
     half_of,
     no_reference,
@@ -32,6 +33,10 @@ from lineloom_lab.evaluation.log_bench_log import (
 _RANGE_MIN_M = 0.02
 _SURE_SCORE, _SURE_QUANTILE = 0.9, 0.05
 _ODOMETRY = "-odometry"
+_RIGID = {
+    "three-lidars-one-robot": RigidPair("left_scan", "rear_scan", Pose(-0.938, 0.548, 2.349)),
+}
+"""How lidars are mounted, by the log's name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +64,7 @@ class LogFile:
         else:
             recordings = (_bare("robot", tuple(_from_jsonl(self.path))),)
         if self.pseudo is None:
-            return BenchLog(recordings, "none")
+            return BenchLog(recordings, "none", _RIGID.get(self.name))
         return _with_pseudo(recordings, self.pseudo)
 
 

@@ -16,7 +16,9 @@ import numpy as np
 from lineloom_lab.evaluation.log_bench_log import BenchLog, Half, Recording
 from lineloom_lab.simulation import (
     ROBOT_RADIUS_M,
+    Blockers,
     DriftingOdometry,
+    Followers,
     FreeSpace,
     Lidar,
     Planner,
@@ -38,9 +40,9 @@ class Conditions:
     """What a ladder varies.
 
     beams: in a sweep. view_deg: field of view. range_m: the lidar's reach. noise_mm: standard
-    deviation of ranges. rate_hz: sweeps a second. turn_rate: the fastest turn [rad/s]; people: who
-    walk about. swept: share of its period that a sweep takes, so that motion skews it. told:
-    whether scans say so by their `time_increment`.
+    deviation of ranges. rate_hz: sweeps a second. turn_rate: the fastest turn [rad/s]. people: who
+    walk about; followers: who walk behind the robot. swept: share of its period that a sweep takes,
+    so that motion skews it. told: whether scans say so by their `time_increment`.
     """
 
     beams: int = 360
@@ -50,6 +52,7 @@ class Conditions:
     rate_hz: float = 10.0
     turn_rate: float = 1.0
     people: int = 0
+    followers: int = 0
     swept: float = 0.0
     told: bool = True
 
@@ -111,7 +114,7 @@ class SimulatedLog:
         return list(_BUILDINGS)[self.seed % len(_BUILDINGS)]
 
     def load(self) -> BenchLog:
-        """Simulate it; the same seed gives the same building, drive and people on every rung."""
+        """Simulate it; the same seed gives the same building, stops and people on every rung."""
         conditions = self.rung.conditions
         world = _BUILDINGS[self.building](self.seed)
         robot = _robot(world, conditions, self.seed, self.duration_s)
@@ -137,6 +140,7 @@ def ladder_rungs() -> list[Rung]:
         ("turn, rad/s", "turn_rate", (0.5, 1, 2, 3), swept),
         ("turn untold, rad/s", "turn_rate", (0.5, 1, 2, 3), untold),
         ("people", "people", (0, 2, 4, 8), _BASE),
+        ("followers", "followers", (1, 2, 4), replace(_BASE, view_deg=360.0)),
     )
     return [
         Rung(name, float(value), replace(base, **{what: value}))
@@ -158,7 +162,10 @@ def _robot(world: World, conditions: Conditions, seed: int, duration_s: float) -
         turn_rate=conditions.turn_rate,
         odometry=DriftingOdometry(),
     )
-    if not conditions.people:
-        return robot
-    crowd = Walkers.strolling(planner, conditions.people, np.random.default_rng([seed, 14]))
-    return replace(robot, blockers=(crowd,))
+    blockers: list[Blockers] = []
+    if conditions.people:
+        rng = np.random.default_rng([seed, 14])
+        blockers.append(Walkers.strolling(planner, conditions.people, rng))
+    if conditions.followers:
+        blockers.append(Followers(robot.drive, conditions.followers))
+    return replace(robot, blockers=tuple(blockers))

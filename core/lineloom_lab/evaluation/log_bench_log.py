@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
+from lineloom_core.geometry import Pose
 from lineloom_core.scan import Scan
 from numpy.typing import NDArray
 
@@ -24,6 +25,15 @@ _HALVES: dict[Half, tuple[str, ...]] = {
         "odd-index",
     ),
 }  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class RigidPair:
+    """Two lidars of one robot, by name. T_first_second: the second in the first one's frame."""
+
+    first: str
+    second: str
+    T_first_second: Pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,10 +59,11 @@ class Recording:
 
 @dataclass(frozen=True, eq=False)
 class BenchLog:
-    """A log: the recordings of all its lidars."""
+    """A log: the recordings of all its lidars. rigid: how two of one robot are mounted."""
 
     recordings: tuple[Recording, ...]
     trust: Trust
+    rigid: RigidPair | None = None
 
 
 class LogSource(Protocol):

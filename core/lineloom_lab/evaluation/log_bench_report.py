@@ -20,7 +20,8 @@ components, in largest: pieces of the map, and the share of scans (of those with
 there is one) in the one with most. unplaced: scans in none. ATE: rms of the positions in the
 largest after alignment, against an independent reference. agree: against a naive search without
 loops, share of its scans within {AGREE_M:g} m and {math.degrees(AGREE_RAD):.0f} degrees; "?": it is
-itself unsure. wrong: scans off by more than {WRONG_M:g} m in their component. relations: of a
+itself unsure; of lidars on one robot, where two are in one component, the share that lies as they
+are mounted. wrong: scans off by more than {WRONG_M:g} m in their component. relations: of a
 robot's scans 1 to 16 apart and up to {RELATION_WAY_M:.0f} m of way, the share off by more than
 {WRONG_M:g} m. robots: with a scan in the largest, of all. steps: from one scan to the next in one
 component, the share within {STEP_M:g} m and {math.degrees(STEP_RAD):.0f} degrees, and how many are
@@ -64,6 +65,7 @@ def _row(result: LogResult) -> dict[str, Any]:
         "trust": result.trust,
         "cpu_ms": result.cpu_ms,
         "share_same": result.share_same,
+        "share_rigid": result.share_rigid,
         "unreadable": result.unreadable,
     }
     if figures is None or steps is None:
@@ -86,7 +88,7 @@ def _cells(result: LogResult) -> list[str]:
     if figures is None or steps is None:
         return [*head, "unreadable", *[""] * (len(_HEADER) - len(head) - 1)]
     blind, sure = result.trust == "none", result.trust == "reference"
-    agree = "" if blind or sure else percent(figures.share_agreeing)
+    agree = percent(result.share_rigid if blind else None if sure else figures.share_agreeing)
     return [
         *head,
         f"{figures.scans}",

@@ -61,22 +61,25 @@ def step_figures(robots: Sequence[PlacedRobot]) -> StepFigures:
     return StepFigures(steps, right, breaks)
 
 
-def worst_steps(robots: Sequence[PlacedRobot], most: int = 10) -> list[BadStep]:
-    """Return wrong steps, furthest off first (in units of what is right), then breaks in order.
-
-    Breaks stand where there is a reference to show what was missed.
-    """
+def wrong_steps(robots: Sequence[PlacedRobot]) -> list[BadStep]:
+    """Return the steps that are not right, furthest off first in units of what is right."""
     wrong: list[tuple[float, BadStep]] = []
-    broken: list[BadStep] = []
     for number, robot in enumerate(robots):
         own = _Steps.of(robot)
         excess = own.excess
         for i in np.flatnonzero(own.judged & (excess > 1.0)).tolist():
             step = BadStep(number, i, float(own.off_m[i]), float(own.off_rad[i]))
             wrong.append((float(excess[i]), step))
-        broken += [BadStep(number, i, None, None) for i in np.flatnonzero(own.shown).tolist()]
-    wrong.sort(key=lambda row: -row[0])
-    return [*(step for _, step in wrong), *broken][:most]
+    return [step for _, step in sorted(wrong, key=lambda row: -row[0])]
+
+
+def broken_steps(robots: Sequence[PlacedRobot]) -> list[BadStep]:
+    """Return the breaks at which there is a reference to show what was missed, as they come."""
+    return [
+        BadStep(number, i, None, None)
+        for number, robot in enumerate(robots)
+        for i in np.flatnonzero(_Steps.of(robot).shown).tolist()
+    ]
 
 
 @dataclass(frozen=True, eq=False)

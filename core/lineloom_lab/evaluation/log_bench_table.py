@@ -8,7 +8,12 @@ from lineloom_lab.evaluation.log_bench_pool import Pool
 
 
 def table(cells: Sequence[Sequence[str]], names: int) -> str:
-    """Set rows, the header first, as a table whose first `names` columns are text."""
+    """Set rows, the header first, as a table whose first `names` columns are text.
+
+    Columns in which nothing stands are left out.
+    """
+    told = [k for k in range(len(cells[0])) if k < names or any(line[k] for line in cells[1:])]
+    cells = [[line[k] for k in told] for line in cells]
     rule = ["---"] * names + ["---:"] * (len(cells[0]) - names)
     lines = [cells[0], rule, *cells[1:]]
     widths = [max(len(line[k]) for line in lines) for k in range(len(rule))]

@@ -1,7 +1,7 @@
 """The worst steps of a mapped log, drawn: both scans as the map lays them, and as they truly lie.
 
-Wrong steps come first, furthest off first; then breaks, where the map does not tie a scan to the
-one before it, as the log has them.
+Wrong steps are drawn furthest off first; breaks, where the map does not tie a scan to the one
+before it, by how much the two have in common.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 from lineloom_lab.evaluation.log_bench import LogCase
 from lineloom_lab.evaluation.log_bench_judge import PlacedRobot
 from lineloom_lab.evaluation.log_bench_log import Recording
-from lineloom_lab.evaluation.log_bench_steps import BadStep, step_figures, worst_steps
+from lineloom_lab.evaluation.log_bench_steps import BadStep, broken_steps, wrong_steps
 from lineloom_lab.experiments.figure import Figure, grid
 from lineloom_lab.experiments.overlay import overlay
 from lineloom_lab.experiments.plan import Plan
@@ -37,31 +37,33 @@ class StepAlbum:
     def __call__(
         self, case: LogCase, robots: Sequence[Recording], placed: Sequence[PlacedRobot]
     ) -> None:
-        """Write one page, SVG and PNG, where a step is wrong or a break can be shown."""
+        """Write a page of wrong steps and one of breaks, SVG and PNG, where there are any."""
         name = f"{case.source.name}, {case.setting.name}"
-        figure = draw_worst_steps(name, robots, placed)
-        if figure is not None:
+        for figure in draw_worst_steps(name, robots, placed):
             figure.save(self.folder)
 
 
 def draw_worst_steps(
     name: str, robots: Sequence[Recording], placed: Sequence[PlacedRobot], most: int = 10
-) -> Figure | None:
-    """Draw the `most` worst, one a row: as the map has it, as it is. None where all is right."""
-    worst = worst_steps(placed, most)
-    if not worst:
-        return None
-    figures = step_figures(placed)
-    panels = [
-        panel for step in worst for panel in _panels(step, robots[step.robot], placed[step.robot])
-    ]
-    return Figure(
-        "worst-steps-" + name.replace(",", "").replace(" ", "-"),
-        f"{name}: the worst of {figures.wrong} wrong steps and {figures.breaks} breaks",
-        "Side by side: two scans in a row as the map lays them, and as they truly lie.",
-        grid(panels, 2),
-        420.0,
-    )
+) -> list[Figure]:
+    """Draw the `most` worst of either kind, one a row: as the map has it, as it is."""
+    wrong, breaks = wrong_steps(placed), broken_steps(placed)
+    breaks.sort(key=lambda step: -_overlap(step, robots[step.robot]))
+    file = name.replace(",", "").replace(" ", "-")
+    figures = []
+    for kind, steps in (("wrong steps", wrong), ("breaks", breaks)):
+        panels = [p for s in steps[:most] for p in _panels(s, robots[s.robot], placed[s.robot])]
+        if panels:
+            figures.append(
+                Figure(
+                    f"{kind.replace(' ', '-')}-{file}",
+                    f"{name}: the worst of {len(steps)} {kind}",
+                    "Side by side: two scans in a row as mapped, and as they truly lie.",
+                    grid(panels, 2),
+                    420.0,
+                )
+            )
+    return figures
 
 
 def overlap_share(reference: Scan, current: Scan, T_ref_cur: Pose) -> float:
@@ -84,7 +86,7 @@ def _panels(step: BadStep, robot: Recording, placed: PlacedRobot) -> list[Plan]:
     else:
         believed = Pose(*se2.between(placed.poses[i], placed.poses[i + 1]).tolist())
         said = f"{told}: off by {step.off_m:.2f} m, {math.degrees(step.off_rad):.1f} degrees"
-    share = overlap_share(before, after, truth)
+    share = _overlap(step, robot)
     true = (
         f"true: {math.hypot(truth.x, truth.y):.2f} m, {math.degrees(truth.theta):.0f} degrees, "
         f"overlap {100 * share:.0f} %"
@@ -94,6 +96,12 @@ def _panels(step: BadStep, robot: Recording, placed: PlacedRobot) -> list[Plan]:
         overlay(said, before, after, believed, reach),
         overlay(true, before, after, truth, reach),
     ]
+
+
+def _overlap(step: BadStep, robot: Recording) -> float:
+    i = step.index
+    truth = Pose(*se2.between(robot.reference[i], robot.reference[i + 1]).tolist())
+    return overlap_share(robot.scans[i], robot.scans[i + 1], truth)
 
 
 def _why_not(placed: PlacedRobot, index: int) -> str:

@@ -13,7 +13,7 @@ from lineloom_lab.simulation.buildings import (
     world_names,
 )
 from lineloom_lab.simulation.drive import Drive, Leg
-from lineloom_lab.simulation.faults import Blockers, ScanLoss, Walkers, glazed
+from lineloom_lab.simulation.faults import Blockers, Followers, ScanLoss, Walkers, glazed
 from lineloom_lab.simulation.fleet import Fleet
 from lineloom_lab.simulation.free_space import FreeSpace
 from lineloom_lab.simulation.lidar import Lidar, scanner_360, sick_lms200
@@ -30,6 +30,7 @@ __all__ = [
     "DriftingOdometry",
     "Drive",
     "Fleet",
+    "Followers",
     "FreeSpace",
     "Leg",
     "Lidar",

@@ -56,6 +56,24 @@ class Walkers:
         return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
 
+@dataclass(frozen=True, eq=False)
+class Followers:
+    """People who walk behind somebody, one behind the other. drive: whom they follow.
+
+    behind_s: how much later each is where the one before was; at the start all wait there.
+    """
+
+    drive: Drive
+    count: int
+    behind_s: float = 2.0
+    radius: float = 0.2
+
+    def disks(self, time_s: float) -> NDArray[np.float64]:
+        """Return where they are at a global time [s]: shape (k, 3), rows x, y, radius [m]."""
+        where = self.drive.positions([time_s - self.behind_s * k for k in range(1, self.count + 1)])
+        return np.column_stack([where, np.full(self.count, self.radius)])
+
+
 def disks_in_view(
     blockers: Sequence[Blockers], time_s: float, x: float, y: float, margin: float
 ) -> NDArray[np.float64]:

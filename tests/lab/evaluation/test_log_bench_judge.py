@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from lineloom_lab.evaluation.log_bench_judge import PlacedRobot, judge
-from lineloom_lab.evaluation.log_bench_steps import BadStep, step_figures, worst_steps
+from lineloom_lab.evaluation.log_bench_steps import BadStep, broken_steps, step_figures, wrong_steps
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -191,17 +191,16 @@ def test_steps_are_counted_within_a_component() -> None:
     names = ["a"] * 7 + ["", "b", "b"]
     found = step_figures([robot(poses, truth, names)])
     assert (found.steps, found.wrong, found.breaks) == (7, 2, 2)
-    worst = worst_steps([robot(poses, truth, names)])
-    assert [(w.index, w.off_m is None) for w in worst] == [
-        (2, False), (4, False), (6, True), (7, True),
-    ]  # fmt: skip
+    assert [step.index for step in wrong_steps([robot(poses, truth, names)])] == [2, 4]
+    assert [step.index for step in broken_steps([robot(poses, truth, names)])] == [6, 7]
 
 
 def test_steps_that_are_right_are_not_among_the_worst() -> None:
     truth = straight(5)
-    assert worst_steps([robot(truth, truth)]) == []
+    assert wrong_steps([robot(truth, truth)]) == []
+    assert broken_steps([robot(truth, truth)]) == []
     jumped = truth.copy()
     jumped[2:, 1] += 2.0
-    assert worst_steps([robot(truth, truth), robot(jumped, truth)], 1) == [
+    assert wrong_steps([robot(truth, truth), robot(jumped, truth)]) == [
         BadStep(1, 1, pytest.approx(2.0), pytest.approx(0.0))  # type: ignore[arg-type]
     ]

@@ -36,6 +36,7 @@ def test_ladders_reach_as_far_as_lidars_do() -> None:
         "turn, rad/s": (0.5, 3),
         "turn untold, rad/s": (0.5, 3),
         "people": (0, 8),
+        "followers": (1, 4),
     }
 
 
@@ -107,3 +108,10 @@ def test_the_command_runs_the_rungs_asked_for(
     castle = CliRunner().invoke(app, ["bench", "ladders", "--only", "castle"])
     assert castle.exit_code == 2
     assert "rate, Hz" in castle.stderr
+
+
+@pytest.mark.long
+def test_two_jobs_give_what_one_gives() -> None:
+    cases = [LogCase(SimulatedLog(SLOW, seed, 20.0), Setting()) for seed in range(3)]
+    alone, together = run_log_bench(cases), run_log_bench(cases, jobs=2)
+    assert [replace(r, cpu_ms=0.0) for r in alone] == [replace(r, cpu_ms=0.0) for r in together]

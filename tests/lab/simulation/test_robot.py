@@ -12,6 +12,8 @@ from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.scan import Mount
 from lineloom_lab.simulation import (
     DriftingOdometry,
+    Drive,
+    Followers,
     FreeSpace,
     Planner,
     ScanLoss,
@@ -123,6 +125,13 @@ def test_scan_loss_has_its_share_and_burst() -> None:
     for share, burst in ((1.0, 2.0), (0.2, 0.5), (0.9, 1.0)):
         with pytest.raises(ValueError, match=r"share|burst"):
             ScanLoss(share, burst)
+
+
+def test_followers_are_where_the_robot_was() -> None:
+    drive = Drive.along([(1.0, 1.0), (7.0, 1.0)], rectangle(), radius=0.25, speed=0.5)
+    crowd = Followers(drive, 2, behind_s=2.0)
+    np.testing.assert_allclose(crowd.disks(6.0), [[3.0, 1.0, 0.2], [2.0, 1.0, 0.2]])
+    np.testing.assert_allclose(crowd.disks(0.0)[:, :2], [[1.0, 1.0], [1.0, 1.0]])
 
 
 def test_people_walk_in_the_way(planner: Planner, robot: SimulatedRobot) -> None:

@@ -38,7 +38,7 @@ def ladders(
 
     Beams from 45 to 1080, views of 57 to 360 degrees, 4 to 80 m of reach, noise of 5 to 50 mm, 1 to
     40 scans a second, turns of up to 3 rad/s while the beam sweeps (told by the scans, or not), and
-    up to eight people; offices, flats and corridors.
+    up to eight people about, or four who follow the robot; in offices, flats and corridors.
 
     \b
     Example:

@@ -20,7 +20,7 @@ Jobs = Annotated[
 ]
 Pictures = Annotated[
     Path | None,
-    typer.Option(metavar="DIR", help="Draw the ten worst steps of every run into DIR."),
+    typer.Option(metavar="DIR", help="Draw the ten worst steps and breaks of every run into DIR."),
 ]
 JsonFile = Annotated[
     Path | None,
