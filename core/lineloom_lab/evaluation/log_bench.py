@@ -30,6 +30,7 @@ from lineloom_lab.evaluation.log_bench_log import BenchLog, Half, LogSource, Rec
 from lineloom_lab.evaluation.log_bench_rigid import rigid_figures
 from lineloom_lab.evaluation.log_bench_sameness import same_share
 from lineloom_lab.evaluation.log_bench_steps import StepFigures, step_figures
+from lineloom_lab.evaluation.log_bench_wheels import wheels_rmse
 
 _TURN_SCANS = 50
 _LOGS_KEPT = 2
@@ -52,8 +53,8 @@ class LogResult:
 
     cpu_ms: mapping, per scan. share_same: of what the same run under the true clock placed, what
     lies likewise here; None without such a run. share_rigid: of two lidars on one robot, where both
-    are in one component, what lies as they are mounted; None elsewhere. unreadable: why there is
-    nothing else.
+    are in one component, what lies as they are mounted; None elsewhere. wheels_rmse: error of the
+    odometry alone [m], where it was sent. unreadable: why there is nothing else.
     """
 
     log: str
@@ -65,6 +66,7 @@ class LogResult:
     cpu_ms: float
     share_same: float | None = None
     share_rigid: float | None = None
+    wheels_rmse: float | None = None
     unreadable: str | None = None
     placed: tuple[PlacedRobot, ...] = field(default=(), compare=False, repr=False)
 
@@ -116,6 +118,7 @@ def run_case(
         step_figures(placed),
         1e3 * cpu_s / sum(len(robot.scans) for robot in robots),
         share_rigid=rigid,
+        wheels_rmse=wheels_rmse(robots),
         placed=tuple(placed),
     )
 

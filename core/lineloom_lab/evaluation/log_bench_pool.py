@@ -12,6 +12,7 @@ from typing import TypeVar
 
 from lineloom_lab.evaluation.log_bench import LogResult
 from lineloom_lab.evaluation.log_bench_judge import LogFigures
+from lineloom_lab.evaluation.log_bench_wheels import is_worse
 
 _Row = TypeVar("_Row")
 
@@ -26,7 +27,8 @@ class Pool:
     whole: of the logs, those that became one map without wrong relations, as far as there is a
     reference. ate_rmse [m] is the mean over logs with an independent reference, share_agreeing over
     those with a naive one; shares that need either, over those that have one. None where none
-    has. share_same: over runs under another clock.
+    has. share_same: over runs under another clock. wheels_rmse [m]: likewise of odometry alone;
+    worse_than_wheels: logs whose map is more wrong than that, beyond what is allowed.
     """
 
     logs: int
@@ -39,6 +41,8 @@ class Pool:
     share_relations_wrong: float | None
     share_steps_right: float | None
     share_same: float | None
+    wheels_rmse: float | None
+    worse_than_wheels: int
     steps_wrong: int
     breaks: int
     cpu_ms: float
@@ -69,6 +73,10 @@ def pooled(results: Sequence[LogResult]) -> Pool:
         share_relations_wrong=_mean(judged, lambda f: f.share_relations_wrong),
         share_steps_right=_mean(steps, lambda s: s.share_right),
         share_same=_mean(results, lambda r: r.share_same),
+        wheels_rmse=_mean(results, lambda r: r.wheels_rmse),
+        worse_than_wheels=sum(
+            is_worse(r.figures.ate_rmse, r.wheels_rmse) for r in results if r.figures is not None
+        ),
         steps_wrong=sum(s.wrong for s in steps),
         breaks=sum(s.breaks for s in steps),
         cpu_ms=fmean(r.cpu_ms for r in results if r.figures is not None),

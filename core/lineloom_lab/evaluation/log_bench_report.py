@@ -14,27 +14,34 @@ from lineloom_lab.evaluation.log_bench_pool import WHOLE_SHARE, WHOLE_WRONG
 from lineloom_lab.evaluation.log_bench_sameness import SAME_M
 from lineloom_lab.evaluation.log_bench_steps import STEP_M, STEP_RAD
 from lineloom_lab.evaluation.log_bench_table import metres, percent, table
+from lineloom_lab.evaluation.log_bench_wheels import WORSE_M, WORSE_SHARE
+
+_DEGREES, _STEP_DEGREES = math.degrees(AGREE_RAD), math.degrees(STEP_RAD)
 
 LEGEND = f"""\
-components, in largest: pieces of the map, and the share of scans (of those with a reference, where
-there is one) in the one with most. unplaced: scans in none. ATE: rms of the positions in the
-largest after alignment, against an independent reference. agree: against a naive search without
-loops, share of its scans within {AGREE_M:g} m and {math.degrees(AGREE_RAD):.0f} degrees; "?": it is
-itself unsure; of lidars on one robot, where two are in one component, the share that lies as they
-are mounted. wrong: scans off by more than {WRONG_M:g} m in their component. relations: of a
-robot's scans 1 to 16 apart and up to {RELATION_WAY_M:.0f} m of way, the share off by more than
-{WRONG_M:g} m. robots: with a scan in the largest, of all. steps: from one scan to the next in one
-component, the share within {STEP_M:g} m and {math.degrees(STEP_RAD):.0f} degrees, and how many are
-not; breaks: steps that the map does not make. same: of what the same run under the true clock
-placed, the share within {100 * SAME_M:.0f} cm here. CPU: mapping, ms a scan. Of several logs, one
-map: those with {100 * WHOLE_SHARE:.0f} % of their scans in the largest and at most
-{100 * WHOLE_WRONG:g} % of the relations wrong; ATE and shares are means over logs, counts are sums.
+- in largest: share of the scans (of those with a reference, where there is one) in the component
+  that has most. unplaced: scans in none. robots: that have a scan in the largest.
+- ATE: rms of the positions in the largest after alignment, against an independent reference.
+  wheels: of the odometry alone, where it was sent; worse: maps off by more than that plus
+  {100 * WORSE_SHARE:.0f} % and {WORSE_M:g} m.
+- agree: share of the scans within {AGREE_M:g} m and {_DEGREES:.0f} degrees of a naive search without
+  loops, with "?" where that is itself unsure. Of lidars on one robot: where two are in one
+  component, the share that lies as they are mounted.
+- wrong: scans off by more than {WRONG_M:g} m in their component. relations: of a robot's scans 1 to
+  16 apart and up to {RELATION_WAY_M:.0f} m of way, the share off by more than {WRONG_M:g} m.
+- steps right: from one scan to the next in one component, the share within {STEP_M:g} m and
+  {_STEP_DEGREES:.0f} degrees; wrong steps: the others. breaks: steps that the map does not make.
+- same: of what the same run under the true clock placed, the share within {100 * SAME_M:.0f} cm.
+- CPU: mapping, ms a scan.
+- one map: logs with {100 * WHOLE_SHARE:.0f} % of their scans in the largest and at most
+  {100 * WHOLE_WRONG:g} % of the relations wrong. Of several logs, ATE and shares are means, counts
+  are sums.
 """
 
 _HEADER = [
     "log", "half", "setting", "scans", "components", "in largest %", "unplaced %", "ATE m",
-    "agree %", "wrong %", "relations %", "robots", "steps right %", "same %", "wrong steps",
-    "breaks", "CPU ms",
+    "wheels m", "agree %", "wrong %", "relations %", "robots", "steps right %", "same %",
+    "wrong steps", "breaks", "CPU ms",
 ]  # fmt: skip
 
 
@@ -66,6 +73,7 @@ def _row(result: LogResult) -> dict[str, Any]:
         "cpu_ms": result.cpu_ms,
         "share_same": result.share_same,
         "share_rigid": result.share_rigid,
+        "wheels_rmse": result.wheels_rmse,
         "unreadable": result.unreadable,
     }
     if figures is None or steps is None:
@@ -96,6 +104,7 @@ def _cells(result: LogResult) -> list[str]:
         percent(figures.share_in_largest),
         percent(figures.share_unplaced),
         metres(figures.ate_rmse) if sure else "",
+        metres(result.wheels_rmse),
         agree + ("?" if result.trust == "doubtful" else ""),
         "" if blind else percent(figures.share_wrong),
         "" if blind else percent(figures.share_relations_wrong),

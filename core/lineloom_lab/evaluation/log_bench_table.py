@@ -38,6 +38,8 @@ POOL_COLUMNS: dict[str, Callable[[Pool], str]] = {
     "in largest %": lambda pool: percent(pool.share_in_largest),
     "unplaced %": lambda pool: percent(pool.share_unplaced),
     "ATE m": lambda pool: metres(pool.ate_rmse),
+    "wheels m": lambda pool: metres(pool.wheels_rmse),
+    "worse": lambda pool: "" if pool.wheels_rmse is None else f"{pool.worse_than_wheels}",
     "agree %": lambda pool: percent(pool.share_agreeing),
     "wrong %": lambda pool: percent(pool.share_wrong),
     "relations %": lambda pool: percent(pool.share_relations_wrong),

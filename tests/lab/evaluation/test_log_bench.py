@@ -129,6 +129,17 @@ def test_odometry_is_sent_only_where_it_is_asked_for() -> None:
     assert [s.odometry for s in with_wheels.scans] == [s.odometry for s in recording().scans]
 
 
+def test_a_map_with_odometry_stands_beside_wheels_alone() -> None:
+    """The odometry of this log is the truth."""
+    settings = (Setting(), Setting(odometry=True))
+    without, with_wheels = run_log_bench([LogCase(Small(scans=30), s) for s in settings])
+    assert without.wheels_rmse is None
+    assert with_wheels.wheels_rmse == pytest.approx(0.0, abs=1e-9)
+    assert "wheels m" not in to_markdown([without])
+    assert "| wheels m " in to_markdown([with_wheels])
+    assert "| worse A " in to_markdown([with_wheels])
+
+
 def test_clocks_change_stamps_alone() -> None:
     scans = [replace(scan, time_increment=1e-4) for scan in recording().scans[:50]]
     true = np.array([scan.stamp for scan in scans])
