@@ -24,8 +24,8 @@ LEGEND = f"""\
 - ATE: rms of the positions in the largest after alignment, against an independent reference.
   wheels: of the odometry alone, where it was sent; worse: maps off by more than that plus
   {100 * WORSE_SHARE:.0f} % and {WORSE_M:g} m.
-- agree: share of the scans within {AGREE_M:g} m and {_DEGREES:.0f} degrees of a naive search without
-  loops, with "?" where that is itself unsure. Of lidars on one robot: where two are in one
+- agree: share of the scans within {AGREE_M:g} m and {_DEGREES:.0f} degrees of a naive search
+  without loops, with "?" where that is itself unsure. Of lidars on one robot: where two are in one
   component, the share that lies as they are mounted.
 - wrong: scans off by more than {WRONG_M:g} m in their component. relations: of a robot's scans 1 to
   16 apart and up to {RELATION_WAY_M:.0f} m of way, the share off by more than {WRONG_M:g} m.
