@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -13,6 +13,7 @@ from lineloom_core.geometry import Pose
 from lineloom_core.mapping.facts.tracker import Tracked, Tracker
 from lineloom_core.mapping.facts.wheels import Wheels
 from lineloom_lab.simulation import Lidar, SimulatedRobot, SimulatedScan, World, rooms, sick_lms200
+from numpy.typing import NDArray
 
 from tests.core.mapping.drives import legs, track, track_errors
 
@@ -23,7 +24,7 @@ FAULTS: dict[str, Fault] = {
     "turns the wrong way": lambda i, p, rng: Pose(p.x, p.y, -p.theta),
     "mirrored": lambda i, p, rng: Pose(-p.x, p.y, -p.theta),
     "frozen": lambda i, p, rng: Pose(0.0, 0.0, 0.0),
-    "freezes half way": lambda i, p, rng: p if i < 60 else Pose(1.0, 2.0, 0.5),
+    "freezes half way": lambda i, p, rng: p if i < 20 else Pose(1.0, 2.0, 0.5),
     "jumps": lambda i, p, rng: Pose(p.x + 5.0 * (i // 25), p.y - 3.0 * (i // 40), p.theta),
     "metres of noise": lambda i, p, rng: Pose(*(p.to_array() + rng.normal(size=3)).tolist()),
     "absurd": lambda i, p, rng: Pose(1e12 * (-1) ** i, 1e-300, 100.0 * i),
@@ -43,16 +44,38 @@ def follow(scans: list[SimulatedScan]) -> list[Tracked]:
     return [track(tracker, s.scan) for s in scans]
 
 
-@pytest.mark.parametrize("seed", [3, 4])
+@dataclass(frozen=True)
+class Followed:
+    """A drive, and how far off the tracker was without odometry: m and rad of each placed scan."""
+
+    scans: list[SimulatedScan]
+    alone: NDArray[np.float64]
+
+    def is_better_than(self, fault: Fault, seed: int) -> bool:
+        """Whether what the wheels say makes it worse, or loses a scan."""
+        found = track_errors(self.scans, follow(faulty(self.scans, fault, seed)))
+        if len(found) < len(self.alone):
+            return True
+        worse = found.max(axis=0) - self.alone.max(axis=0)
+        return bool(worse[0] > 0.05 or worse[1] > 0.01)
+
+
+@pytest.fixture(scope="module")
+def drives() -> list[Followed]:
+    found = []
+    for seed in range(20):
+        world, lidar = rooms(seed % 5), sick_lms200()
+        robot = SimulatedRobot.wandering("r", world, lidar=lidar, seed=seed, duration_s=9.0)
+        scans = list(robot.scans())
+        found.append(Followed(scans, track_errors(scans, follow(scans))))
+    return found
+
+
 @pytest.mark.parametrize("fault", FAULTS)
-def test_wrong_odometry_is_as_good_as_none(fault: str, seed: int) -> None:
-    robot = SimulatedRobot.wandering("r", rooms(2), lidar=sick_lms200(), seed=seed, duration_s=30.0)
-    scans = list(robot.scans())
-    alone = track_errors(scans, follow(scans))
-    found = track_errors(scans, follow(faulty(scans, FAULTS[fault], seed)))
-    assert len(found) == len(alone)
-    assert found[:, 0].max() < alone[:, 0].max() + 0.05
-    assert found[:, 1].max() < alone[:, 1].max() + 0.01
+def test_wrong_odometry_is_as_good_as_none(fault: str, drives: list[Followed]) -> None:
+    worse = [seed for seed, d in enumerate(drives) if d.is_better_than(FAULTS[fault], seed)]
+    print(f"odometry {fault}: as good as none on {20 - len(worse)} of 20 drives; worse: {worse}")
+    assert len(worse) <= 1
 
 
 def room_and_corridor() -> World:
@@ -63,26 +86,34 @@ def room_and_corridor() -> World:
     return World(np.array(walls, dtype=np.float64))
 
 
-@pytest.fixture(scope="module")
-def out_of_a_room() -> list[SimulatedScan]:
+def driven_out_of_a_room(seed: int, beams: int, way: float) -> list[SimulatedScan]:
     lidar = Lidar(
         angle_min=-math.pi,
-        angle_increment=math.tau / 720,
-        beams=720,
+        angle_increment=math.tau / beams,
+        beams=beams,
         range_min=0.1,
         range_max=8.0,
         rate_hz=5.0,
     )
-    drive = legs(Pose(1.5, 0.0, 0.0), (2.0, 0.0), (0.0, 1.0), (0.0, -1.0), (26.0, 0.0))
-    return list(SimulatedRobot("r", room_and_corridor(), lidar, drive, seed=1).scans())
+    drive = legs(Pose(1.5, 0.0, 0.0), (2.0, 0.0), (0.0, 1.0), (0.0, -1.0), (way, 0.0))
+    return list(SimulatedRobot("r", room_and_corridor(), lidar, drive, seed).scans())
 
 
-def test_right_odometry_cures_the_plain_corridor(out_of_a_room: list[SimulatedScan]) -> None:
-    alone = track_errors(out_of_a_room, follow(out_of_a_room))
-    right = faulty(out_of_a_room, lambda i, p, rng: p, 0)
-    found = track_errors(right, follow(right))
-    assert alone[-1, 0] > 0.5  # nothing but the wheels can know
-    assert found[:, 0].max() < 0.3
+@pytest.fixture(scope="module")
+def out_of_a_room() -> list[SimulatedScan]:
+    return driven_out_of_a_room(1, 720, 26.0)
+
+
+def test_right_odometry_cures_the_plain_corridor() -> None:
+    astray, cured = [], []
+    for seed in range(20):
+        scans = driven_out_of_a_room(seed, 360, 13.0)
+        astray.append(track_errors(scans, follow(scans))[-1, 0] > 0.1)
+        right = faulty(scans, lambda i, p, rng: p, 0)
+        cured.append(track_errors(right, follow(right))[:, 0].max() < 0.1)
+    print(f"plain corridor: astray on {sum(astray)} of 20 drives, with odometry {20 - sum(cured)}")
+    assert sum(astray) >= 10, "nothing but the wheels can know"
+    assert sum(cured) >= 19
 
 
 @pytest.mark.parametrize("fault", ["three times too long", "turns the wrong way", "mirrored"])
