@@ -8,16 +8,14 @@ from pathlib import Path
 from time import process_time
 
 import numpy as np
-from lineloom_core.geometry import Pose
-from lineloom_core.graph import Edge, Piece, PoseGraph, settle
-from lineloom_core.graph.solver import levenberg_marquardt
 from lineloom_core.mapping.config import PlaceConfig
 from lineloom_core.places import Place, PlaceIndex, recognise
 from lineloom_core.warm_up.drive import warm_up
 from lineloom_lab.simulation import sick_lms200
 
-from tests.benchmarks.long_drive import growth_along_a_drive, solving_row
-from tests.benchmarks.row import Row, median_seconds, table
+from tests.benchmarks.graph_sizes import graph_rows
+from tests.benchmarks.long_drive import growth_along_a_drive
+from tests.benchmarks.row import Row, table
 from tests.benchmarks.scans import DATA
 from tests.core.places.conftest import office_stretches
 
@@ -28,7 +26,8 @@ def growth(data: Path, *, quick: bool) -> list[Row]:
     stretches = office_stretches(sick_lms200(), 4 if quick else 16)
     made = [m.place for s in stretches for m in (s.forth, s.again, s.back)]
     rows = [_recognition(made, size) for size in sizes]
-    rows += [_solving(size) for size in ((100,) if quick else (100, 300, 1000, 3000))]
+    keyframes = (300,) if quick else (300, 1000, 3000, 10_000, 30_000)
+    rows += [row for size in keyframes for row in graph_rows(size)]
     return rows + growth_along_a_drive(data, quick=quick)
 
 
@@ -60,39 +59,6 @@ def _recognition(made: list[Place], size: int) -> Row:
         brute,
         f"a shortlist of {most}, each compared in full",
     )
-
-
-def _solving(size: int) -> Row:
-    """A robot goes round the same loop again and again; the newest loop is off by 2 cm."""
-    graph, information = PoseGraph(), np.diag([1e4, 1e4, 1e5])
-    rng, step = np.random.default_rng(size), Pose(0.4, 0.0, 2.0 * np.pi / 100)
-    graph.add_node(0, Pose.identity())
-    for k in range(1, size):
-        T = step @ Pose(*rng.normal(0.0, (0.004, 0.004, 0.001)).tolist())
-        graph.add_node(k, graph.pose(k - 1) @ T)
-        graph.add_edge(Edge(f"s{k}", "sequential", k - 1, k, T, information, False))
-        if k >= 100 and k % 4 == 0:
-            here = Pose.identity()
-            graph.add_edge(Edge(f"l{k}", "loop", k - 100, k, here, information, True))
-    _solve(graph)
-    newest = Pose(0.02, 0.0, 0.0)
-    graph.add_edge(Edge("new", "loop", max(size - 101, 0), size - 1, newest, information, True))
-    piece = graph.piece(0)
-    ours = median_seconds(lambda _: _solve(graph, piece), range(5))
-    return solving_row(
-        f"graph, {size} keyframes solved after one more loop",
-        ours,
-        median_seconds(lambda _: levenberg_marquardt(piece, 0), range(3)),
-        "a loop at every fourth keyframe; not every keyframe asks for it",
-    )
-
-
-def _solve(graph: PoseGraph, start: Piece | None = None) -> None:
-    """What `SiteMap.optimise` does, beginning at the poses of `start` if there is one."""
-    if start is not None:
-        graph.take_poses(start, start.poses)
-    piece = graph.piece(0)
-    graph.take_poses(piece, settle(piece, held=0))
 
 
 def main() -> None:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 from lineloom_core import timing
 from lineloom_core.geometry import Pose
-from lineloom_core.graph import optimize
+from lineloom_core.graph import PoseGraph
 
 
 @pytest.fixture(autouse=True)
@@ -43,5 +43,7 @@ def test_a_stage_is_the_function_it_was() -> None:
 def test_the_solver_is_a_stage() -> None:
     runs: Counter[str] = Counter()
     timing.listen(lambda stage, _: runs.update([stage]))
-    optimize({0: Pose(0.0, 0.0, 0.0)}, [], anchors=(0,))
+    graph = PoseGraph()
+    graph.add_node(0, Pose(0.0, 0.0, 0.0))
+    graph.optimise(0)
     assert runs == {"optimise": 1}

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lineloom_core.geometry import Pose, se2
 from lineloom_core.graph.consistency import CHI2_99
 from lineloom_core.graph.edge import Edge
-from lineloom_core.graph.normal_equations import CAUCHY_K
+from lineloom_core.graph.factors import CAUCHY_K
 
 _REFINEMENTS = 10
 

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 from lineloom_core.geometry import Pose, se2
-from lineloom_core.graph import Edge, Piece
+from lineloom_core.graph import Edge, PoseGraph
 from lineloom_core.graph.edge import EdgeKind
+from lineloom_core.graph.growth import Growth
 from numpy.typing import NDArray
 
 STEP_SIGMA = (0.02, 0.02, 0.005)
@@ -20,9 +21,9 @@ def random_information(rng: np.random.Generator) -> NDArray[np.float64]:
     return np.asarray(L @ L.T * 300.0 + np.diag([200.0, 200.0, 1000.0]))
 
 
-def random_piece(
+def random_component(
     rng: np.random.Generator, count: int, loops: int, *, noise: float = 1.0, wrong: int = 0
-) -> tuple[Piece, NDArray[np.float64]]:
+) -> tuple[Growth, NDArray[np.float64]]:
     """A tree over `count` nodes and loops between any two of them; and the true poses.
 
     Trees of chains, branches and stars; edges either way round. Edges are off by
@@ -45,8 +46,30 @@ def random_piece(
         I = random_information(rng)  # noqa: E741
         edges.append(Edge(f"e{k}", kind, a, b, Pose.from_array(T), I, kind == "loop"))
     start = se2.compose(truth, 0.5 * noise * rng.normal(0.0, STEP_SIGMA, (count, 3)))
-    nodes = {i: Pose.from_array(row) for i, row in enumerate(start)}
-    return Piece.of(nodes, edges), truth
+    return Growth.of(np.arange(count), start, edges), truth
+
+
+def edges_of(component: Growth) -> list[Edge]:
+    """A component's edges as objects."""
+    return [
+        Edge(name, "loop" if robust else "sequential", a, b, Pose(*T), information, robust)
+        for name, (a, b), T, information, robust in zip(
+            component.names,
+            component.ends.tolist(),
+            component.measured.tolist(),
+            component.information,
+            component.robust.tolist(),
+            strict=True,
+        )
+    ]
+
+
+def components_of(graph: PoseGraph) -> tuple[tuple[int, ...], ...]:
+    """The connected sets of nodes, each sorted, ordered by their smallest nodes."""
+    members: dict[int, list[int]] = {}
+    for node in sorted(graph.nodes):
+        members.setdefault(graph.component_root(node), []).append(node)
+    return tuple(tuple(members[root]) for root in sorted(members))
 
 
 def laps(n: int, loops: int, seed: int, wrong: int = 0) -> tuple[list[Pose], list[Edge]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from functools import cache
 from typing import NamedTuple
@@ -10,7 +11,8 @@ import numpy as np
 import pytest
 from lineloom_core.features import extract_features
 from lineloom_core.geometry import Pose, se2
-from lineloom_core.graph import Edge, marginal_covariance
+from lineloom_core.graph import Edge
+from lineloom_core.graph.growth import Growth
 from lineloom_core.mapping.facts.drift import Chain, NoiseFigure, reach, step_drift, way_drift
 from lineloom_core.mapping.facts.tracker import Tracker
 from lineloom_core.matching.local_map import Cloud, LocalMap
@@ -23,6 +25,7 @@ from lineloom_lab.simulation import (
 )
 from numpy.typing import NDArray
 
+from tests.core.graph.dense_twins import relative_covariance
 from tests.core.mapping.drives import legs, track
 
 
@@ -178,15 +181,19 @@ def test_a_chain_is_the_marginal_of_its_graph(
 ) -> None:
     steps, covariances = wound
     chain = chain_of(steps, covariances)
-    poses = {0: Pose.identity()}
+    poses = [Pose.identity()]
     edges = []
     for k, (step, covariance) in enumerate(zip(steps, covariances, strict=True)):
-        poses[k + 1] = poses[k] @ step
+        poses.append(poses[k] @ step)
         I = np.linalg.inv(covariance)  # noqa: E741
         edges.append(Edge(str(k), "sequential", k, k + 1, step, 0.5 * (I + I.T), False))
+    graph = Growth.of(np.arange(len(poses)), se2.stack(poses), edges)
     for a, b in ((0, 12), (3, 9), (9, 3), (11, 12)):
-        expected = marginal_covariance(poses, edges, 0, a, b)
-        np.testing.assert_allclose(chain.between(a, b), expected, rtol=1e-6, atol=1e-12)
+        expected = relative_covariance(graph, graph.poses, a, b)
+        np.testing.assert_allclose(chain.between(a, b), expected, rtol=1e-4, atol=1e-9)
+    at = [3, 9, 0, 12, 9]
+    for (i, a), (j, b) in itertools.product(enumerate(at), repeat=2):
+        np.testing.assert_allclose(chain.among(at)[i, j], chain.between(a, b), atol=1e-12)
 
 
 def test_a_chain_adds_up_and_grows(

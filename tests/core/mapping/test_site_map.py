@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -112,3 +113,24 @@ def test_optimising_pulls_a_bent_track_straight_and_keeps_the_anchor(
     site.optimise(ids[4])
     assert site.pose(ids[0]) == Pose.identity()
     assert site.pose(ids[-1]).distance(true[-1]) < 0.2 * off_before
+
+
+def test_a_keyframe_that_waits_for_the_graph_is_as_sure_as_the_last_that_does_not_and_its_steps(
+    site: SiteMap, loop: list[SimulatedScan]
+) -> None:
+    a, b = lay_track(site, loop[:12]), lay_track(site, loop[:12], robot="b")
+    link(site, a[4], b[4], Pose.identity(), state="accepted")
+    with pytest.raises(ValueError, match="not optimised"):
+        site.drift(a[2], b[7])
+    site.optimise(a[0])
+    for k in range(4):
+        last, T = site.keyframes[b[-1]], Pose(0.4, 0.02 * k, 0.1)
+        step = replace(last.step or pytest.fail("a step"), previous=last.id, T_previous_this=T)
+        b.append(b[-1] + 1)
+        site.append(replace(last, id=b[-1], step=step, repeat=last.repeat + 1))
+    ends = [a[2], a[9], b[3], b[11], *b[12:]]
+    waiting = site.drifts(ends).among(ends)
+    site.optimise(a[0])
+    entered = site.drifts(ends).among(ends)
+    assert not np.array_equal(waiting, entered)
+    np.testing.assert_allclose(waiting, entered, rtol=1e-5, atol=1e-5 * np.abs(entered).max())

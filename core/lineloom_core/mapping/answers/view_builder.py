@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lineloom_core.geometry import se2
-from lineloom_core.graph import Covariances, in_map_axes
 from lineloom_core.mapping.answers.map_lines import fused_lines
 from lineloom_core.mapping.answers.site_view import (
     ComponentView,
@@ -18,6 +17,7 @@ from lineloom_core.mapping.answers.site_view import (
 )
 from lineloom_core.mapping.answers.trajectories import Trajectories, Way, Whereabouts
 from lineloom_core.mapping.belief.constraint import Constraint
+from lineloom_core.mapping.belief.graph_drift import Drifts
 from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.facts.robot_record import RobotRecord
 
@@ -25,10 +25,10 @@ from lineloom_core.mapping.facts.robot_record import RobotRecord
 def build_view(site: SiteMap, robots: dict[str, RobotRecord], version: int) -> SiteView:
     """Compose the view of a version; changes nothing."""
     component_of = {k: site.component_id(k) for k in site.keyframes}
-    covariances = _Covariances(site)
+    drifts = _drifts(site, robots)
     return SiteView(
         version=version,
-        robots={n: _robot(site, r, component_of, covariances) for n, r in robots.items()},
+        robots={n: _robot(site, r, component_of, drifts) for n, r in robots.items()},
         components=_components(site, component_of),
         merged_into=dict(site.merged_into),
         trajectories=_trajectories(site, robots, component_of),
@@ -54,7 +54,10 @@ def _components(site: SiteMap, component_of: dict[int, str]) -> tuple[ComponentV
 
 
 def _robot(
-    site: SiteMap, record: RobotRecord, component_of: dict[int, str], covariances: _Covariances
+    site: SiteMap,
+    record: RobotRecord,
+    component_of: dict[int, str],
+    drifts: dict[int, Drifts],
 ) -> RobotView:
     pose = covariance = component = None
     latest = record.latest
@@ -63,7 +66,7 @@ def _robot(
         pose = site.pose(latest.keyframe) @ latest.T_keyframe_laser @ T_base_laser.inverse()
         holder, _ = site.resting.on(latest.keyframe)
         component = component_of[holder]
-        covariance = covariances.of(holder)
+        covariance = _covariance(site, holder, drifts)
     return RobotView(
         robot=record.name,
         component=component,
@@ -79,19 +82,21 @@ def _robot(
     )
 
 
-class _Covariances:
-    """Covariances of keyframes' poses against their component's anchor, in the map's axes."""
+def _drifts(site: SiteMap, robots: dict[str, RobotRecord]) -> dict[int, Drifts]:
+    """By component root: how sure the robots' latest keyframes are against it, asked at once."""
+    latest: dict[int, list[int]] = {}
+    for record in robots.values():
+        if record.latest is not None:
+            holder, _ = site.resting.on(record.latest.keyframe)
+            latest.setdefault(site.component_root(holder), []).append(holder)
+    return {root: site.drifts([root, *keyframes]) for root, keyframes in latest.items()}
 
-    def __init__(self, site: SiteMap) -> None:
-        self._site = site
-        self._factored: dict[int, Covariances] = {}
 
-    def of(self, keyframe: int) -> NDArray[np.float64]:
-        """Return a keyframe's, shape (3, 3); a component is factored once."""
-        root = self._site.component_root(keyframe)
-        if root not in self._factored:
-            self._factored[root] = Covariances(self._site.graph.piece(root), root)
-        return in_map_axes(self._factored[root].of(keyframe), self._site.pose(keyframe))
+def _covariance(site: SiteMap, keyframe: int, drifts: dict[int, Drifts]) -> NDArray[np.float64]:
+    """A keyframe's pose against its component's anchor, (3, 3), in the map's axes."""
+    root = site.component_root(keyframe)
+    heading = np.array([0.0, 0.0, site.pose(keyframe).theta])
+    return se2.transport(drifts[root](root, keyframe), heading)
 
 
 def _trajectories(

@@ -62,12 +62,12 @@ def _joined(site: SiteMap, a: int, b: int, within: float | None) -> bool:
 
 def _cycle_error(site: SiteMap, c: Constraint, o: Constraint) -> float:
     pair = (c, o)
+    ends = [k.keyframe_a for k in pair], [k.keyframe_b for k in pair]
     d2 = cycle_errors(
         np.array([site.pose(k.keyframe_a).to_array() for k in pair]),
         np.array([site.pose(k.keyframe_b).to_array() for k in pair]),
         np.array([k.T_a_b.to_array() for k in pair]),
         np.broadcast_to(CONSTRAINT_FLOOR, (2, 3, 3)),
-        lambda i, j: site.drift(pair[i].keyframe_a, pair[j].keyframe_a),
-        lambda i, j: site.drift(pair[i].keyframe_b, pair[j].keyframe_b),
+        *(site.drifts(keyframes).among(keyframes) for keyframes in ends),
     )
     return float(d2[0, 1])

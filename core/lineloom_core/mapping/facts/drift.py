@@ -13,12 +13,13 @@ falls short in simulation, where averaged surfaces make tracks drift less than t
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lineloom_core.codec import storable
-from lineloom_core.geometry import Pose
+from lineloom_core.geometry import Pose, se2
 from lineloom_core.growing import GrowingArray
 
 MEASURED_SHORT = 2.0
@@ -91,6 +92,14 @@ class Chain:
         difference = self._sums.rows[b] - self._sums.rows[a]
         covariance: NDArray[np.float64] = A @ (difference if b >= a else -difference) @ A.T
         return covariance
+
+    def among(self, positions: Sequence[int]) -> NDArray[np.float64]:
+        """Covariances of T_a_b among places in the chain, (n, n, 3, 3) [a, b], at b."""
+        at = np.asarray(positions, dtype=np.int64)
+        sums, ahead = self._sums.rows[at], np.sign(at[None, :] - at[:, None])
+        difference = (sums[None, :] - sums[:, None]) * ahead[:, :, None, None]
+        A = se2.adjoint(se2.inverse(self._poses.rows[at]))
+        return np.asarray(A[None, :] @ difference @ np.swapaxes(A, 1, 2)[None, :])
 
     def _pose(self, position: int) -> Pose:
         return Pose(*self._poses.rows[position].tolist())

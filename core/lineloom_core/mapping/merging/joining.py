@@ -9,14 +9,13 @@ they would overlap; 6. accept, join, optimise.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from itertools import islice
 
 import numpy as np
 
 from lineloom_core.checks import JOINED
 from lineloom_core.geometry import Pose
-from lineloom_core.graph import consistent_sets, pairwise_consistent, rigid_join, settle, together
+from lineloom_core.graph import Trial, consistent_sets, pairwise_consistent, rigid_join
 from lineloom_core.mapping.belief.constraint import CONSTRAINT_FLOOR, Constraint, turned_round
 from lineloom_core.mapping.belief.refusals import refuse_barred
 from lineloom_core.mapping.belief.site_map import SiteMap
@@ -37,14 +36,14 @@ def join(site: SiteMap, root: int, keyframe: int) -> ComponentMerged | None:
     if objection := JOINED.objection(config, figures):
         _wait(site, candidates, objection)
         return None
-    T_A_B, together = _solved_together(site, a_root, b_root, chosen)
-    figures |= overlap_of_sets(site, chosen, together)
+    T_A_B, trial = _solved_together(site, a_root, b_root, chosen)
+    figures |= overlap_of_sets(site, chosen, trial.poses)
     if objection := JOINED.objection(config, figures):
         _wait(site, chosen, objection)
         return None
     merged = _accept(site, chosen, b_root, T_A_B, figures)
+    site.graph.adopt(trial)
     _drop_others(site, candidates, chosen)
-    site.optimise(a_root)
     return merged
 
 
@@ -107,13 +106,13 @@ def _best_sets(
     if not candidates:
         return [], []
     n = len(candidates)
+    ends = [c.keyframe_a for c in candidates], [c.keyframe_b for c in candidates]
     T_A_a = np.array([site.pose(c.keyframe_a).to_array() for c in candidates])
     T_B_b = np.array([site.pose(c.keyframe_b).to_array() for c in candidates])
     T_a_b = np.array([c.T_a_b.to_array() for c in candidates])
     agree = pairwise_consistent(
         T_A_a, T_B_b, T_a_b, np.broadcast_to(CONSTRAINT_FLOOR, (n, 3, 3)),
-        lambda i, j: site.drift(candidates[i].keyframe_a, candidates[j].keyframe_a),
-        lambda i, j: site.drift(candidates[i].keyframe_b, candidates[j].keyframe_b),
+        site.drifts(ends[0]).among(ends[0]), site.drifts(ends[1]).among(ends[1]),
     )  # fmt: skip
     sets = [[candidates[i] for i in members] for members in consistent_sets(agree, least=1)]
     sets.sort(key=lambda s: -sum(c.evidence for c in s))
@@ -134,8 +133,8 @@ def _distinctive(site: SiteMap, chosen: list[Constraint]) -> int:
 
 def _solved_together(
     site: SiteMap, a_root: int, b_root: int, chosen: list[Constraint]
-) -> tuple[Pose, Mapping[int, Pose]]:
-    """T_A_B, and all poses in a's frame as they would be if the set were believed.
+) -> tuple[Pose, Trial]:
+    """T_A_B, and all in a's frame as it would be if the set were believed.
 
     Both maps have drifted: held against each other as rigid pieces, right ones would collide.
     """
@@ -145,9 +144,7 @@ def _solved_together(
         {c.keyframe_b: site.pose(c.keyframe_b) for c in chosen},
         between,
     )
-    piece_a, piece_b = site.graph.piece(a_root), site.graph.piece(b_root).moved(T_A_B)
-    both = together(piece_a, piece_b).with_edges(between)
-    return T_A_B, both.table(settle(both, both.row(a_root)))
+    return T_A_B, site.graph.solve_joined(a_root, b_root, T_A_B, between)
 
 
 def _drop_others(site: SiteMap, candidates: list[Constraint], chosen: list[Constraint]) -> None:

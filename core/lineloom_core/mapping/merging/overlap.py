@@ -12,6 +12,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+import numpy as np
+from numpy.typing import NDArray
+
 from lineloom_core.geometry import Pose
 from lineloom_core.mapping.belief.constraint import CONSTRAINT_FLOOR, Constraint
 from lineloom_core.mapping.belief.site_map import SiteMap
@@ -74,19 +77,32 @@ def places_near(site: SiteMap, keyframes: list[int]) -> list[Place]:
 
     As far, that is, as drift lets the two maps be compared at all.
     """
-    most = site.config.join.rigid_within**2
-    return [
-        place
+    most, at = site.config.join.rigid_within**2, [site.pose(k) for k in keyframes]
+    levers = {
+        place.id: [there.distance(site.pose(place.anchor)) for there in at]
         for place in site.places.values()
         if site.same_component(place.anchor, keyframes[0])
-        and min(_looseness(site, k, place.anchor) for k in keyframes) <= most
+    }
+    # Beyond some metres the lever alone is too much: of those drift is not even asked.
+    reached = [
+        site.places[number]
+        for number, lengths in levers.items()
+        if CONSTRAINT_FLOOR[2, 2] * min(lengths) ** 2 <= most
+    ]
+    drifts = site.drifts([*keyframes, *(place.anchor for place in reached)])
+    return [
+        place
+        for place in reached
+        if min(
+            _looseness(drifts(k, place.anchor), lever)
+            for k, lever in zip(keyframes, levers[place.id], strict=True)
+        )
+        <= most
     ]
 
 
-def _looseness(site: SiteMap, matched: int, place: int) -> float:
-    """Variance of a place's position [m^2] where a keyframe of its component is matched."""
-    lever = site.pose(matched).distance(site.pose(place))
-    drift = site.drift(matched, place)
+def _looseness(drift: NDArray[np.float64], lever: float) -> float:
+    """Variance of a place's position [m^2] at so many metres from what is matched."""
     return float(0.5 * (drift[0, 0] + drift[1, 1]) + CONSTRAINT_FLOOR[2, 2] * lever**2)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from lineloom_core.checks import DOUBTED, WIDE_LOOP
 from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.mapping.belief.constraint import CONSTRAINT_FLOOR, Constraint
+from lineloom_core.mapping.belief.graph_drift import Drifts
 from lineloom_core.mapping.belief.refusals import refuse_barred
 from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.facts.drift import reach
@@ -30,8 +31,10 @@ def close_wide_loops(site: SiteMap, place: Place) -> bool:
         and site.component_root(c.keyframe_b) == root
     ]
     candidates = refuse_barred(site, candidates)
+    drifts = site.drifts(k for c in candidates for k in (c.keyframe_a, c.keyframe_b))
     # All are judged by the graph as it was: accepting one changes what the drift allows the next.
-    believed = [c for c in [_judged(site, c, candidates) for c in candidates] if c.consistency_set]
+    judged = [_judged(site, c, candidates, drifts) for c in candidates]
+    believed = [c for c in judged if c.consistency_set]
     for c in believed:
         site.add_constraint(c)
     if believed:
@@ -40,13 +43,16 @@ def close_wide_loops(site: SiteMap, place: Place) -> bool:
     return bool(believed)
 
 
-def _judged(site: SiteMap, c: Constraint, candidates: list[Constraint]) -> Constraint:
+def _judged(
+    site: SiteMap, c: Constraint, candidates: list[Constraint], drifts: Drifts
+) -> Constraint:
     """The candidate with its figures, accepted where nothing speaks against it."""
     config, off = site.config.wide_loops, _correction(site, c)
-    figures = {"drift_sigmas": _sigmas(site, c, off), **_corrected(off)}
+    figures = {"drift_sigmas": _sigmas(c, off, drifts), **_corrected(off)}
     agreeing: list[str] = []
     if not WIDE_LOOP.against(config, figures):
-        agreeing = [o.id for o in candidates if o.id != c.id and _loops_agree(site, c, o)]
+        others = (o for o in candidates if o.id != c.id)
+        agreeing = [o.id for o in others if _loops_agree(site, c, o, drifts)]
         figures["agreeing"] = float(len(agreeing))
     c = c.with_figures(figures)
     objection = WIDE_LOOP.objection(config, figures)
@@ -65,14 +71,14 @@ def _corrected(off: Pose) -> dict[str, float]:
     return {"corrected_m": math.hypot(off.x, off.y), "corrected_rad": abs(off.theta)}
 
 
-def _sigmas(site: SiteMap, c: Constraint, off: Pose) -> float:
+def _sigmas(c: Constraint, off: Pose, drifts: Drifts) -> float:
     """The correction against the drift in between."""
     error = off.to_array()
-    covariance = site.drift(c.keyframe_a, c.keyframe_b) + CONSTRAINT_FLOOR
+    covariance = drifts(c.keyframe_a, c.keyframe_b) + CONSTRAINT_FLOOR
     return math.sqrt(float(error @ np.linalg.solve(covariance, error)))
 
 
-def _loops_agree(site: SiteMap, c: Constraint, o: Constraint) -> bool:
+def _loops_agree(site: SiteMap, c: Constraint, o: Constraint, drifts: Drifts) -> bool:
     """Two loops agree when they correct the graph alike, give or take the drift in between."""
     if {c.place_a, c.place_b} & {o.place_a, o.place_b} == {c.place_a, c.place_b}:
         return False
@@ -84,8 +90,8 @@ def _loops_agree(site: SiteMap, c: Constraint, o: Constraint) -> bool:
     off = (T_c @ at).between(T_o @ at)
     slack = (
         config.slack
-        + reach(site.drift(c.keyframe_a, o.keyframe_a), config.most_sigmas)
-        + reach(site.drift(c.keyframe_b, o.keyframe_b), config.most_sigmas)
+        + reach(drifts(c.keyframe_a, o.keyframe_a), config.most_sigmas)
+        + reach(drifts(c.keyframe_b, o.keyframe_b), config.most_sigmas)
     )
     return math.hypot(off.x, off.y) < slack and abs(angle_difference(off.theta, 0.0)) < config.turn
 
