@@ -6,6 +6,7 @@ its section of the configuration.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from lineloom_core.check import Check, Checks, Figures
@@ -22,16 +23,36 @@ def _near_window(_: Any, threshold: float, __: Figures) -> float:
     return NEAR_SLACK * threshold
 
 
+def _unsupported(config: Any, figures: Figures) -> bool:
+    """After a pause the matcher has to be sure of a step, or it is held to more; after a long one
+    it is in any case.
+    """
+    gap = figures.get("gap", 1.0)
+    backed = figures.get("backed", 0.0) and gap <= config.farthest_gap
+    return gap > config.longest_gap and not backed
+
+
+def _lead_of_step(config: Any, threshold: float, figures: Figures) -> float:
+    gap = figures.get("gap", 1.0)
+    if gap > config.farthest_gap and not figures.get("backed", 0.0):
+        return math.inf
+    return float(config.gap_lead if gap > config.longest_gap else threshold)
+
+
 def _fit_of_step(config: Any, threshold: float, figures: Figures) -> float:
-    after_gap = figures.get("gap_s", 0.0) > config.longest_gap
-    return float(config.gap_fit if after_gap else threshold)
+    return float(config.gap_fit if _unsupported(config, figures) else threshold)
 
 
 def _conflict_of_step(config: Any, threshold: float, figures: Figures) -> float:
-    if figures.get("gap_s", 0.0) > config.longest_gap:
+    if _unsupported(config, figures):
         return float(config.gap_conflict)
     noisy = figures.get("noise", 1.0) > config.noisy_above
     return float(config.noisy_conflict if noisy else threshold)
+
+
+def _of_kin(config: Any, threshold: float, figures: Figures) -> float:
+    """What comes after a break of a robot's own track is probably near: less is asked of it."""
+    return threshold * float(config.kin_share) if figures.get("kin") else threshold
 
 
 def _outdone(_: Any, lead: float, figures: Figures) -> float:
@@ -54,11 +75,25 @@ _SHOWN = (
 # fmt: off
 TRACKED = Checks("A step from one keyframe to the next", "tracker", (
     Check("fit", "On known surfaces", "share", at_least="least_fit", adjusted=_fit_of_step,
-          told="`gap_fit` after a gap", objection="too little of the scan fits"),
+          told="`gap_fit` after a gap that the matcher is not sure of",
+          objection="too little of the scan fits"),
     Check("conflict_share", "In free space", "share", at_most="most_conflict",
           adjusted=_conflict_of_step, objection="walls stand in free space",
-          told="`noisy_conflict` where the lidar is noisy, `gap_conflict` after a gap"),
-    Check("gap_s", "Silence before it", "s"),
+          told="`noisy_conflict` where the lidar is noisy, `gap_conflict` after such a gap"),
+    Check("matched", "Of all the scan on known surfaces", "share", at_least="least_matched",
+          objection="too little of the scan lies on anything known"),
+    Check("misfit", "What speaks against it", at_most="most_misfit",
+          objection="the scan does not fit where it fits best"),
+    Check("lead", "Lead over any other spot", at_least="least_lead",
+          adjusted=_lead_of_step,
+          told="`gap_lead` after a gap; beyond `farthest_gap` only if the matcher is sure",
+          objection="another spot fits almost as well"),
+    Check("wall", "Of what it fits", "m", at_least="least_wall",
+          objection="it shows too little wall to be known by"),
+    Check("surprise", "Unlike the even steps before it", at_most="most_surprise",
+          objection="no robot that drove evenly is there at once"),
+    Check("backed", "The pairwise matcher is sure of it"),
+    Check("gap", "Silence before it, or skipped scans", "intervals"),
     Check("noise", "The robot's noise figure"),
 ))
 
@@ -103,12 +138,15 @@ WIDE_LOOP = Checks("A wide loop", "wide_loops", (
 
 JOINED = Checks("A set of recognitions that joins two components", "join", (
     Check("set_size", "Constraints that agree", "constraints", at_least="least_set",
+          adjusted=_of_kin, told="`kin_share` of it for a robot's own track",
           objection="too few constraints agree"),
     Check("set_places", "Places of either that they rest on", "places",
           at_least="least_set_places", objection="all constraints rest on one place"),
     Check("known_places", "Places of the smaller component", "places", at_least="least_places",
+          adjusted=_of_kin, told="`kin_share` of it for a robot's own track",
           objection="too little is known of one component"),
     Check("set_evidence", "Their evidence", "m", at_least="least_evidence",
+          adjusted=_of_kin, told="`kin_share` of it for a robot's own track",
           objection="too little evidence in all"),
     Check("rival_evidence", "Evidence of a rival set", "m", at_most="lead", adjusted=_outdone,
           told="their evidence, divided by",
@@ -121,6 +159,7 @@ JOINED = Checks("A set of recognitions that joins two components", "join", (
           objection="too little was seen by both to tell it from a place that looks alike"),
     Check("map_missing", "Missing wherever the maps overlap", "share", at_most="most_map_missing",
           objection="the maps contradict each other there ({0:.1%})"),
+    Check("kin", "Of one robot, in one session"),
 ))
 
 DOUBTED = Checks("What was believed, when more is known", "doubt", (

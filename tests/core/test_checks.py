@@ -27,7 +27,7 @@ from tests.core.mapping.drives import mapped
 from tests.docs.checks_page import PAGE, page, parameters_of
 
 CORE = Path(__file__).parents[2] / "core" / "lineloom_core"
-UNITS = {"", "share", "m", "rad", "s", "σ", "1/m²", "points", "places", "constraints"}
+UNITS = {"", "share", "m", "rad", "s", "σ", "1/m²", "points", "places", "constraints", "intervals"}
 ROWS = [pytest.param(t, row, id=f"{t.section}.{row.name}") for t in TABLES for row in t.rows]
 
 
@@ -124,12 +124,12 @@ def test_many_at_once_are_judged_as_each_alone() -> None:
 
 def test_a_step_is_held_to_more_after_a_gap_and_to_less_where_the_lidar_is_noisy() -> None:
     config = MapperConfig().tracker
-    step = {"fit": 0.3, "conflict_share": 0.25, "gap_s": 0.1, "noise": 1.0}
+    step = {"fit": 0.3, "conflict_share": 0.25, "gap": 1.0, "noise": 1.0}
     held = TRACKED.limits(config, step)
     assert (held["fit"].holds, held["conflict_share"].holds) == (True, False)
     noisy = TRACKED.limits(config, {**step, "noise": 2.0})
     assert noisy["conflict_share"].at_most == config.noisy_conflict
-    late = TRACKED.limits(config, {**step, "gap_s": 1.0})
+    late = TRACKED.limits(config, {**step, "gap": 4.0})
     assert (late["fit"].at_least, late["conflict_share"].at_most) == (0.5, 0.1)
 
 

@@ -79,6 +79,11 @@ class ScanFeatures:
     def __len__(self) -> int:
         return int(self.lines.shape[0])
 
+    @property
+    def wall(self) -> float:
+        """Metres of surface that the points stand for: what lies between neighbouring beams."""
+        return float(np.hypot(self.points[:, 0], self.points[:, 1]).sum() * self.angle_increment)
+
     def straight(self) -> ScanFeatures:
         """These features without the lines that are chords of a circle; the same if there is none.
 

@@ -9,7 +9,12 @@ from lineloom_core.graph.consistency import (
     pairwise_consistent,
 )
 from lineloom_core.graph.edge import Edge, EdgeKind
-from lineloom_core.graph.observability import Observability, observe, project_out_weak
+from lineloom_core.graph.observability import (
+    Observability,
+    observe,
+    project_out_weak,
+    without_direction,
+)
 from lineloom_core.graph.piece_join import rigid_join
 from lineloom_core.graph.pose_graph import PoseGraph
 from lineloom_core.graph.trial import Trial
@@ -29,4 +34,5 @@ __all__ = [
     "pairwise_consistent",
     "project_out_weak",
     "rigid_join",
+    "without_direction",
 ]

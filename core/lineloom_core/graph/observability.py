@@ -96,6 +96,11 @@ def project_out_weak(
     return result
 
 
+def without_direction(information: NDArray[np.float64], direction: float) -> NDArray[np.float64]:
+    """Return the information (3, 3) with nothing known along a direction [rad], others kept."""
+    return _without(information, np.array([math.cos(direction), math.sin(direction), 0.0]))
+
+
 def _without(information: NDArray[np.float64], u: NDArray[np.float64]) -> NDArray[np.float64]:
     """Marginalise the coordinate along the unit vector u: I - I u u^T I / (u^T I u)."""
     Iu = information @ u

@@ -52,15 +52,28 @@ class TrackerConfig:
         4, "scans", "unfit ones in a row before the track is given up", 1, 10_000
     )
     longest_gap: float = parameter(
-        0.6, "s", "silence after which the last step's velocity means nothing", 0.001
+        3.0, "intervals", "silence after which the last step's velocity means nothing", 1.0
     )
     gap_fit: float = parameter(0.5, "share", "`least_fit` after such a silence")
     gap_conflict: float = parameter(0.1, "share", "`most_conflict` after such a silence")
     longest_silence: float = parameter(
-        10.0, "s", "after it a robot may have been carried anywhere", 0.001
+        60.0, "intervals", "after it a robot may have been carried anywhere", 1.0
     )
+    farthest_gap: float = parameter(
+        15.0, "intervals", "silence after which the pairwise matcher has to be sure", 1.0
+    )
+    least_wall: float = parameter(2.0, "m", "of wall that a searched scan fits on")
+    least_matched: float = parameter(
+        0.12, "share", "of all of a searched scan on known surfaces", 0.0, 1.0
+    )
+    most_misfit: float = parameter(11.0, "", "of a searched scan: see `step_search`")
+    gap_lead: float = parameter(1.5, "", "`least_lead` after a gap")
+    most_surprise: float = parameter(
+        4.5, "", "of a step after small and even ones: minus its log-likelihood by `motion`"
+    )
+    least_lead: float = parameter(0.8, "", "in cost over any other spot: see `step_search`")
     prior_sigma: float = parameter(
-        0.1, "m, rad", "how far off a prediction is for the next scan, at 5 a second", 1e-4, 10.0
+        0.1, "m, rad", "how far off a prediction is in steady driving", 1e-4, 10.0
     )
     least_isotropy: float = parameter(
         0.001, "", "information across over along, below which there is none", 0.0, 1.0
@@ -142,6 +155,9 @@ class JoinConfig:
     )
     doubted_points: float = parameter(
         180.0, "points", "three pieces of furniture, each in a few pairs of places"
+    )
+    kin_share: float = parameter(
+        0.5, "share", "of all that is asked of a robot's own track that is found again", 0.01, 1.0
     )
     rigid_within: float = parameter(
         0.1, "m", "places count for `most_map_missing` that drift has moved less against the set"

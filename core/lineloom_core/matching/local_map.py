@@ -13,10 +13,12 @@ from lineloom_core.codec import storable
 from lineloom_core.features import ScanFeatures
 from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.matching import _registration_kernels as _kernels
+from lineloom_core.matching import _wide_search_kernels as _wide
 
 _SECTOR_RAD = math.radians(10.0)
 _SECTOR_SHIFT = 0.113
 """Beams lie at whole or half degrees: none may lie on a border, where the last bit tells."""
+_LEAST_SEARCHED = 5  # points that can be looked for
 _LEAST_POINTS = 10  # of half a scan that a registration can be tried with
 _HALF_HOLD = np.diag([25.0, 25.0, 100.0])
 """Information that keeps the covariance of half a scan finite where it observes nothing."""
@@ -124,6 +126,21 @@ class LocalMap:
             reach_xy, reach_theta, step_xy, step_theta, pull,
         )  # fmt: skip
         return Pose.from_array(best[:3]), float(best[3])
+
+    def search_around(self, cloud: Cloud, guess: Pose, *, reach: float, most: int) -> list[Pose]:
+        """The likeliest poses within `reach` m of a guess, turned in any way, best first."""
+        if len(cloud.sparse) < _LEAST_SEARCHED:
+            return []
+        margin = math.ceil(2.0 * reach / _wide.COARSE) + 1
+        cells = (math.ceil(n * _kernels.CELL / _wide.COARSE) for n in self.field.shape)
+        nx, ny = (n + 2 * margin for n in cells)
+        corner = self.ox - margin * _wide.COARSE, self.oy - margin * _wide.COARSE
+        coarse = _wide.coarse_field(self.surface, *corner, nx, ny)
+        rows = _wide.search_widely(
+            coarse, *corner, self.field, self.ox, self.oy, cloud.sparse, guess.to_array(),
+            reach, most,
+        )  # fmt: skip
+        return [Pose.from_array(row[:3]) for row in rows]
 
     def register(
         self,

@@ -26,12 +26,14 @@ def warm_up() -> bool:
 
 
 def drive() -> None:
-    """Map two robots in a made-up corridor, draw it, and match a pair."""
+    """Map three robots in a made-up corridor, draw it, and match a pair."""
     mapper = SiteMapper()
     scans = [_room_scan(x, seq) for seq, x in enumerate(np.arange(0.0, 11.0, 0.45))]
     for scan in scans:
         mapper.add("a", scan)
         mapper.add("b", scan)
+    for scan in (*scans[:3], scans[15]):  # after a pause a step is searched for
+        mapper.add("c", scan)
     view = mapper.view()
     rasterise(mapper.rays(view.components[0].id), np.array([[0.0, 0.0, 1.0, 1.0]]))
     LineMatcher().match(scans[0], scans[2])

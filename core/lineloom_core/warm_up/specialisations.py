@@ -13,6 +13,7 @@ import numpy as np
 from numba import typeof, types
 
 from lineloom_core.matching._sweep import Search, Sweep
+from lineloom_core.matching.spots import Latest
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +22,7 @@ class Specialisation:
 
     arguments: a letter each: F f (float64), I i (int64), J (int32), H (uint16), U (uint8), B b
     (bool), an array of so many dimensions in C order (r: read only) where a digit follows; S and Q
-    for a matcher's Sweep and Search.
+    for a matcher's Sweep and Search, L for the Latest scans.
     """
 
     kernel: str
@@ -58,6 +59,9 @@ def _type(code: str) -> Any:
         return _SWEEP
     if code == "Q":
         return typeof(Search(0, 0, 0.0, 0, 0.0, 0.0, 0.0, 0, 0, 0, 0))
+    if code == "L":
+        rows, one = np.zeros((1, 1)), np.zeros(1)
+        return typeof(Latest(rows, one, one, rows, rows, np.zeros(1, np.int64)))
     return types.Array(_ITEMS[code[0]], int(code[1]), "C", readonly=code.endswith("r"))
 
 
@@ -92,6 +96,8 @@ MAPPING = _parsed(f"""
     matching._covariance_kernels.fill_covariance | S S F1 f f f f b F2
     matching._kernels.match_sweeps               | S S Q
     places._kernels.match_places                 | {_PLACE} {_PLACE} i i f i f f f f i i i f f
+    matching._spot_kernels.settle_spots          | J2 F2 f f F2 F2 F1 F2 f i f S L i f f
+    matching._wide_search_kernels.search_widely  | U2 f f U2 f f F2 F1 f i
     matching._registration_kernels.register      | J2 F2 f f F2 F2 F1 F1 F1 f f i
     graph._residual_kernels.linearise            | F2 I2 F2 F3 F1 F1 I2 I1 F2 F3 F3 b
     fusion._kernels.merge_pass                   | F2 I1 f f f f
@@ -102,6 +108,7 @@ MAPPING = _parsed(f"""
     graph._elimination_kernels.factorise         | F3 F3 I1 I1 F2
     matching._free_space_kernels.judge_pair      | F2 F1r f f F2 F1r f f F1 i f f F1
     places._kernels.tally_sweeps                 | F2 F1 F2 F1 F1 F2 f f F2
+    matching._wide_search_kernels.coarse_field   | F2 f f i i
     matching._registration_kernels.insert_points | J2 F2 i f f F2 F2 F1 f
     matching._registration_kernels.correlate     | U2 f f F2 F1 f f f f f
     graph._residual_kernels.move                 | F2 i I1 F2
@@ -115,6 +122,7 @@ MAPPING = _parsed(f"""
     matching._hypothesis.turn_information        | f f f f f f
     matching._free_space_kernels.judge_each      | F2 F1 F1r f f f f I1
     matching._free_space_kernels.judge_cloud     | F2 i F1 F2 F1 F1 F2 f f F1
+    matching._agreement_kernels.is_apart         | F1 F1
     matching._proposal_kernels.lying_pairs       | F2 F2 F1 f f f
     matching._hypothesis.evidence                | F1
     matching._hypothesis.translation_information | f f f f f f

@@ -135,7 +135,7 @@ def test_after_a_long_silence_no_scan_is_linked_however_well_it_fits() -> None:
     scans = list(
         robot(rectangle(8.0, 5.0), legs(Pose(2, 2, 0), (2.0, 0.0)), None, SEES_FAR).scans()
     )
-    silence = TrackerConfig().longest_silence
+    silence = TrackerConfig().longest_silence / SEES_FAR.rate_hz
     for wait, status in ((0.5 * silence, "tracked"), (silence + 1.0, "lost")):
         tracker = Tracker()
         for s in scans:

@@ -174,6 +174,21 @@ class SiteMap:
         """Whether the relative pose of two keyframes is known."""
         return self.graph.connected(self.resting.on(a)[0], self.resting.on(b)[0])
 
+    def are_kin(self, a: int, b: int) -> bool:
+        """Whether one robot drove in the components of both keyframes in one session.
+
+        What comes after a break in a robot's track is probably near, unless it was carried away.
+        """
+        of_a, of_b = ({self._drive(t) for t in self._tracks_with(k)} for k in (a, b))
+        return not of_a.isdisjoint(of_b)
+
+    def _tracks_with(self, keyframe: int) -> list[Track]:
+        root = self.component_root(keyframe)
+        return [t for t in self.tracks.values() if self.component_root(t.kept[0]) == root]
+
+    def _drive(self, track: Track) -> tuple[str, str]:
+        return track.robot, self.keyframes[track.kept[0]].scan.session
+
     def way_between(self, a: int, b: int) -> float:
         """Metres over which error may have grown between two keyframes of one component.
 

@@ -25,8 +25,8 @@ from lineloom_core.growing import GrowingArray
 MEASURED_SHORT = 2.0
 """Real tracks were off by up to 1.4 times what was measured: variances are doubled."""
 
-_UNSEEN: NDArray[np.float64] = np.diag([0.3**-2, 0.3**-2, 0.1**-2])
-"""Information on a step that registration does not see: most of a keyframe's way, six degrees."""
+_UNSEEN = 0.3, 0.1
+"""What is known of any step that registration does not see: most of a keyframe's way, 6 degrees."""
 
 _LATEST = 30  # keyframes that the noise figure remembers
 _FIRST_GUESS = 2  # keyframes that the first guess of 1 counts for
@@ -48,13 +48,19 @@ class NoiseFigure:
         self.value += (taken - self.value) / self._count
 
 
-def step_drift(information: NDArray[np.float64], noise: float) -> NDArray[np.float64]:
+def step_drift(
+    information: NDArray[np.float64], noise: float, unseen: tuple[float, float] = (0.0, 0.0)
+) -> NDArray[np.float64]:
     """Covariance (3, 3) of a tracked step in the tangent at its end.
 
     information: of the registration, points taken as independent. noise: the robot's figure.
+    unseen: what is known of the step where registration sees nothing [m, rad], as far as that is
+    less than what is known of any.
     """
     seen = information / (MEASURED_SHORT * max(noise, 1e-3))
-    return np.asarray(np.linalg.inv(seen + _UNSEEN), dtype=np.float64)
+    m, rad = (max(u, least) for u, least in zip(unseen, _UNSEEN, strict=True))
+    held = np.diag([m**-2, m**-2, rad**-2])
+    return np.asarray(np.linalg.inv(seen + held), dtype=np.float64)
 
 
 @storable(

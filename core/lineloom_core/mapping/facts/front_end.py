@@ -29,7 +29,6 @@ from lineloom_core.mapping.facts.trackers import new_tracker
 from lineloom_core.matching.local_map import Cloud, LocalMap
 from lineloom_core.scan import Scan
 
-_STEP_PRIOR = (0.15, 0.05)  # m, rad: what constant velocity is good for where nothing is observed
 _AROUND = 4
 
 
@@ -78,7 +77,9 @@ def _in_order(record: RobotRecord, scan: Scan, *, is_late: bool) -> Scan:
     Ranges count to a micrometre: last bits depend on who computed them, and would tell where a
     line is split or a point falls.
     """
-    scan = replace(scan, ranges=np.round(scan.ranges, 6))
+    ranges = np.round(scan.ranges, 6)
+    ranges.setflags(write=False)  # as every scan's: kernels are compiled for either kind
+    scan = replace(scan, ranges=ranges)
     inverted = record.mount.inverted
     if record.tracker is not None and not is_late:
         scan = without_skew(scan, record.tracker.turn_rate, inverted=inverted)
@@ -180,8 +181,8 @@ def _step(history: History, record: RobotRecord, tracked: Tracked) -> Step | Non
     return Step(
         previous=last.id,
         T_previous_this=last.T_track_laser.between(tracked.pose),
-        information=step_information(np.asarray(tracked.information), _STEP_PRIOR),
-        drift=step_drift(tracked.information, tracked.noise),
+        information=step_information(np.asarray(tracked.information), tracked.unseen),
+        drift=step_drift(tracked.information, tracked.noise, tracked.unseen),
         checks=tracked.checks,
     )
 

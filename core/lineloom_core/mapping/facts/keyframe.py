@@ -56,7 +56,7 @@ def _worst(a: dict[str, float], b: dict[str, float]) -> dict[str, float]:
     """The lower fit and the higher of other figures; the lower gap, so that the step is held to
     what each of its parts came up to.
     """
-    pick = {"fit": min, "gap_s": min}
+    pick = {"fit": min, "gap": min}
     return {name: pick.get(name, max)(a[name], b[name]) for name in a if name in b}
 
 

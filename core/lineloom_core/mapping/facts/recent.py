@@ -74,6 +74,10 @@ class Recent:
         """The latest keyframe and its pose in the track's frame."""
         return self._kept[-1].features, self._kept[-1].pose
 
+    def last(self, most: int) -> list[tuple[ScanFeatures, Pose]]:
+        """Up to so many of the latest keyframes and their poses, the latest first."""
+        return [(k.features, k.pose) for k in islice(reversed(self._kept), most)]
+
     def add(self, features: ScanFeatures, cloud: Cloud, pose: Pose, *, depth: int) -> None:
         """Append a keyframe; the local map is of the latest `depth` from now on."""
         none = np.zeros(len(cloud.points), dtype=np.int64)

@@ -1,15 +1,16 @@
-"""Following one robot from scan to scan, without odometry.
+"""Following one robot from scan to scan, without odometry and by no clock.
 
 Steps of `Tracker.track`:
- 1. predict the pose from the velocity of the last step, after a gap from that of the last second
-    (and from odometry that is believed);
- 2. search a window around each prediction against the local map, wider the longer the gap;
- 3. register the best by points and normals against what stood still (`recent`): people walk;
- 4. along the direction that is known least, weigh the prediction in by what is known;
- 5. check: enough of the scan must lie on known surfaces, and hardly any of it where the keyframe
-    saw free space; after a gap, more and less of it;
+ 1. expect the step that steady driving would make (`motion`), and the one that believed wheels say;
+ 2. where steps have been small and even, search a window around each, register the best by points
+    and normals against what stood still (`recent`): people walk;
+ 3. where that does not fit, or where steps are large, uneven or after a pause, search by evidence,
+    from no pose (`step_search`);
+ 4. along the direction that is known least, weigh what is expected in by what is known;
+ 5. check: enough of the scan must lie on known surfaces, hardly any of it where keyframes saw free
+    space, and nothing else may fit as well; after a pause, more and less of it;
  6. where nothing fits, say so. A few such scans are skipped (somebody stood before the lidar);
-    then the track is lost and a new one begins without any link, as it does after a long silence.
+    then the track is lost and a new one begins without any link.
 
 Departs from the design's line tracker: registration against averaged points of the last
 keyframes needs no special case for scans without lines. Without loops MIT CSAIL comes out within
@@ -19,7 +20,6 @@ keyframes needs no special case for scans without lines. Without loops MIT CSAIL
 from __future__ import annotations
 
 import math
-from collections import deque
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -30,17 +30,22 @@ from lineloom_core.checks import TRACKED
 from lineloom_core.codec import storable
 from lineloom_core.features import ScanFeatures
 from lineloom_core.geometry import Pose
-from lineloom_core.graph import Observability, observe, project_out_weak
+from lineloom_core.graph import Observability, observe, project_out_weak, without_direction
 from lineloom_core.mapping.config import TrackerConfig
 from lineloom_core.mapping.facts.drift import MEASURED_SHORT, NoiseFigure
+from lineloom_core.mapping.facts.motion import Expected, Motion
 from lineloom_core.mapping.facts.recent import Recent
+from lineloom_core.mapping.facts.step_search import search_step
 from lineloom_core.mapping.facts.wheels import Wheels
 from lineloom_core.matching.free_space import judge_sweeps
 from lineloom_core.matching.local_map import Cloud, Registration
 from lineloom_core.timing import timed
 
-_SMOOTHING_S = 0.3
 _SETTLED = 0.12  # m: the gate with which a registration ends
+_PRIOR = 0.15, 0.05  # m, rad: what a step in steady driving, or wheels, are good for
+_SKIPPED = 4.0  # intervals that a skipped scan counts for
+_USUAL_WAY = 0.2  # m: steps up to here are predicted within `prior_sigma`
+_WINDOW = 0.2, 0.08, 0.1, 0.12  # m, m an interval, rad, rad an interval: searched around a step
 
 Status = Literal["first", "tracked", "skipped", "lost"]
 
@@ -60,47 +65,52 @@ class Tracked:
     checks: dict[str, float] = field(default_factory=dict)
     noise: float = 1.0
     """The robot's noise figure so far (see `drift`)."""
+    unseen: tuple[float, float] = _PRIOR
+    """What is known of the step where nothing is observed [m, rad]."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """Where a scan was found. axis: along which the position is open, None where it is known.
+
+    figures: of a search, none where the scan was followed.
+    """
+
+    at: Registration
+    axis: float | None = None
+    figures: dict[str, float] = field(default_factory=dict)
 
 
 @storable(
     "tracker",
     _config=TrackerConfig,
     _recent=Recent,
+    _motion=Motion,
     _pose=Pose,
-    _twist=NDArray[np.float64],
-    _twist_span=float,
-    _turn_rate=float,
-    _stamp=float,
     _odometry=Pose | None,
-    _way=deque[tuple[float, Pose]],
+    _stamp=float,
     _misses=int,
     _noise=NoiseFigure,
     _wheels=Wheels,
 )
 class Tracker:
-    """The state of one track: a local map, the last pose and the last velocity."""
+    """The state of one track: a local map, the last pose and how the robot moves."""
 
     def __init__(self, config: TrackerConfig | None = None) -> None:
         self._config = config or TrackerConfig()
         self._recent = Recent(self._config.memory, self._config.noisy_memory)
+        self._motion = Motion()
         self._pose = Pose.identity()
-        self._twist = np.zeros(3)  # m/s, m/s, rad/s in the laser's axes
-        self._twist_span = 0.0  # s over which it was measured
-        self._turn_rate = 0.0
-        self._stamp = 0.0
         self._odometry: Pose | None = None
-        self._way: deque[tuple[float, Pose]] = deque()  # of the last second: stamps and poses
+        self._stamp = 0.0
         self._misses = 0
         self._noise = NoiseFigure()
         self._wheels = Wheels()
 
     @property
     def turn_rate(self) -> float:
-        """Turn rate over the last few steps [rad/s], 0 where it is not known.
-
-        Smoothed: a single step's is mostly noise, and would wind up the next sweep.
-        """
-        return self._turn_rate
+        """Turn rate over the last few steps [rad/s], 0 where it is not known."""
+        return self._motion.turn_rate
 
     @timed("track")
     def track(
@@ -108,39 +118,48 @@ class Tracker:
     ) -> Tracked:
         """Place the next scan; `odometry` is T_odom_laser where the robot has any."""
         if not len(self._recent):
-            self._accept(Pose.identity(), stamp, odometry)
+            self._motion.begin(self._pose, stamp)
+            self._stamp, self._odometry = stamp, odometry
             self._add_keyframe(features, cloud)
             return Tracked("first", self._pose, True, np.zeros((3, 3)))
-        if stamp - self._stamp > self._config.longest_silence:
+        expected = self._motion.expect(stamp)
+        if expected.gap > self._config.longest_silence:
             return _nowhere("lost")
         rolled = self._rolled(stamp, odometry)
         trusted = rolled is not None and self._wheels.believed
-        predictions = self._predict(stamp, rolled if trusted else None)
-        found = self._register(cloud, predictions, stamp - self._stamp)
+        if trusted:
+            assert rolled is not None
+            expected = expected.with_wheels(self._pose @ rolled)
+        found = self._find(features, cloud, expected)
         unseen = self._unseen(found)
         if rolled is not None:
-            self._wheels.compare(rolled, self._pose.between(found.pose), unseen)
+            self._wheels.compare(rolled, self._pose.between(found.at.pose), unseen)
         # Wheels know the way along a plain corridor; elsewhere velocity has less of a bias.
-        due = predictions[-1] if not trusted or unseen is not None else predictions[-2]
-        found = _without_last_bits(self._held(found, due, stamp - self._stamp))
+        due = expected.nearest(found.at.pose)
+        if trusted and unseen is not None:
+            due = expected.predictions[-1]
+        at = _without_last_bits(self._held(found, due, expected))
         checks = {
-            "fit": found.fit,
-            "conflict_share": self._conflict(features, found.pose),
-            "gap_s": stamp - self._stamp,
+            "fit": at.fit,
+            "conflict_share": self._conflict(features, at.pose),
+            # A scan that was skipped is as good as a pause.
+            "gap": max(expected.gap, _SKIPPED * self._misses),
             "noise": self._noise.value,
+            **found.figures,
         }
         if TRACKED.against(self._config, checks):
             self._misses += 1
             status: Status = "lost" if self._misses >= self._config.patience else "skipped"
             return _nowhere(status, checks)
         self._misses = 0
-        self._accept(found.pose, stamp, odometry)
-        moved_on = self._moved_on(found, checks["conflict_share"])
+        self._accept(at.pose, stamp, odometry)
+        moved_on = self._moved_on(at, checks["conflict_share"])
         if moved_on:
-            self._measure_noise(cloud, found.pose)
+            self._measure_noise(cloud, at.pose)
             self._add_keyframe(features, cloud)
-        information = _in_own_axes(found)
-        return Tracked("tracked", found.pose, moved_on, information, checks, self._noise.value)
+        known = self._known_of(expected, trusted)
+        information = _in_own_axes(at)
+        return Tracked("tracked", at.pose, moved_on, information, checks, self._noise.value, known)
 
     def _moved_on(self, found: Registration, conflict: float) -> bool:
         """Whether the scan is to be a keyframe."""
@@ -156,14 +175,6 @@ class Tracker:
     def _is_noisy(self) -> bool:
         return self._noise.value > self._config.noisy_above
 
-    def _usual_twist(self) -> NDArray[np.float64]:
-        """Velocity over the last second, zero where it is not known."""
-        (then, before), (now, pose) = self._way[0], self._way[-1]
-        if now - then < _SMOOTHING_S:
-            return np.zeros(3)
-        twist: NDArray[np.float64] = before.between(pose).to_array() / (now - then)
-        return twist
-
     def _rolled(self, stamp: float, odometry: Pose | None) -> Pose | None:
         """The step that the wheels have made, None where they cannot have."""
         if odometry is None or self._odometry is None:
@@ -171,59 +182,96 @@ class Tracker:
         step = self._odometry.between(odometry)
         return step if self._wheels.plausible(step, stamp - self._stamp) else None
 
-    def _unseen(self, found: Registration) -> float | None:
+    def _find(self, features: ScanFeatures, cloud: Cloud, expected: Expected) -> _Found:
+        """Steps 2 and 3."""
+        if expected.steady:
+            followed = self._follow(cloud, expected)
+            if self._is_sure(followed, features, expected):
+                return _Found(followed, figures={"surprise": expected.surprise(followed.pose)})
+        searched = search_step(self._recent, features, cloud, self._pose, expected)
+        figures = {
+            "matched": searched.best.matched,
+            "misfit": searched.best.misfit,
+            "lead": searched.lead,
+            "backed": float(searched.backing == "match"),
+            "wall": searched.best.matched * features.wall,
+        }
+        if expected.steady:  # who drives evenly and then is elsewhere was carried
+            figures["surprise"] = expected.surprise(searched.best.pose)
+        return _Found(self._by_what_stood_still(cloud, searched.best.found), searched.axis, figures)
+
+    def _is_sure(self, found: Registration, features: ScanFeatures, expected: Expected) -> bool:
+        """Whether a scan that was followed needs no search."""
+        config = self._config
+        return (
+            found.fit >= config.enough_fit
+            and expected.explains(found.pose)
+            and self._conflict(features, found.pose) <= config.new_conflict
+        )
+
+    def _unseen(self, found: _Found) -> float | None:
         """Direction in the last pose's axes that a registration did not observe."""
-        along = _unobserved(found, self._config.least_isotropy)
+        along = found.axis
+        if along is None:
+            along = _unobserved(found.at, self._config.least_isotropy)
         return None if along is None else along - self._pose.theta
 
-    def _predict(self, stamp: float, rolled: Pose | None) -> list[Pose]:
-        """Where the robot may be: same velocity, and what its wheels say."""
-        elapsed = max(stamp - self._stamp, 0.0)
-        # Where scans arrive in bursts, stamps lie: two steps at most, whatever the clock says.
-        dt = min(elapsed, self._config.longest_gap, 2.0 * self._twist_span)
-        predictions = [self._pose @ Pose.from_array(self._twist * dt)]
-        if elapsed > self._config.longest_gap:
-            predictions.append(self._pose @ Pose.from_array(self._usual_twist() * elapsed))
-        if rolled is not None:
-            predictions.append(self._pose @ rolled)
-        return predictions
-
-    def _register(self, cloud: Cloud, predictions: list[Pose], dt: float) -> Registration:
+    def _follow(self, cloud: Cloud, expected: Expected) -> Registration:
         """Register the best find around any prediction; sure of no more than what stood still."""
-        gap = min(max(dt, 0.2), 1.5)
         best: tuple[Pose, float] | None = None
-        for guess in predictions:
+        stretch = min(max(expected.gap, 1.0), 3.0)
+        for guess in expected.predictions:
             pose, score = self._recent.map.search(
-                cloud, guess, reach_xy=0.2 + 0.4 * gap, reach_theta=0.1 + 0.6 * gap
+                cloud,
+                guess,
+                reach_xy=_WINDOW[0] + _WINDOW[1] * stretch,
+                reach_theta=_WINDOW[2] + _WINDOW[3] * stretch,
             )
             # Odometry must fit clearly better than constant velocity to be believed.
             if best is None or score > best[1] + 0.02:
                 best = pose, score
         assert best is not None
         hold = 1.0 / self._config.prior_sigma**2
+        found = self._recent.map.register(cloud, best[0], prior=(hold, hold, hold))
+        return self._by_what_stood_still(cloud, found, best[0])
+
+    def _by_what_stood_still(
+        self, cloud: Cloud, found: Registration, guess: Pose | None = None
+    ) -> Registration:
+        """The same by steady points alone, where enough of what fits stood still."""
+        hold = 1.0 / self._config.prior_sigma**2
         prior = (hold, hold, hold)
-        found = self._recent.map.register(cloud, best[0], prior=prior)
-        steady = self._recent.steady.register(cloud, best[0], prior=prior)
+        steady = self._recent.steady.register(cloud, guess or found.pose, prior=prior)
         if steady.matched < self._config.steady_share * found.matched:
             return found  # all is new here
         placed = self._recent.map.register(cloud, steady.pose, gate=_SETTLED, iterations=0)
         return replace(placed, information=steady.information)
 
-    def _held(self, found: Registration, predicted: Pose, dt: float) -> Registration:
-        """The same, along the direction that is known least as near the prediction as is due.
+    def _known_of(self, expected: Expected, trusted: bool) -> tuple[float, float]:
+        """What is known of a step [m, rad] where registration observes nothing."""
+        if trusted or expected.steady:
+            return _PRIOR
+        return max(expected.width, _PRIOR[0]), _PRIOR[1]
+
+    def _held(self, found: _Found, due: Pose, expected: Expected) -> Registration:
+        """The same, along the direction that is known least as near what is due as that is known.
 
         Between two plain walls, noise alone would choose the slide, and momentum would keep it.
         """
-        seen = observe(found.information)
-        c, s = _weakest(seen)
-        sigma = self._config.prior_sigma * max(1.0, dt / 0.2)
+        at, config = found.at, self._config
+        if found.axis is not None:
+            # Any slide fits as well: what is due is as good as any, unless the matcher is sure.
+            pose = _slid(at.pose, due, found.axis, 1.0 - found.figures["backed"])
+            return replace(at, pose=pose, information=without_direction(at.information, found.axis))
+        seen = observe(at.information)
+        way = max(self._motion.usual_way / _USUAL_WAY, 1.0)
+        sigma = config.prior_sigma * way * max(expected.gap, 1.0)
         known = seen.lambda_min / (MEASURED_SHORT * max(self._noise.value, 1e-3))
-        share = 1.0 / (1.0 + known * sigma**2)
-        slide = share * (c * (predicted.x - found.pose.x) + s * (predicted.y - found.pose.y))
-        pose = Pose(found.pose.x + slide * c, found.pose.y + slide * s, found.pose.theta)
-        weak_below = self._config.least_isotropy * seen.lambda_max
-        known_of = project_out_weak(found.information, weak_below=weak_below)
-        return replace(found, pose=pose, information=known_of)
+        pose = _slid(at.pose, due, _weakest(seen), 1.0 / (1.0 + known * sigma**2))
+        weak_below = config.least_isotropy * seen.lambda_max
+        return replace(
+            at, pose=pose, information=project_out_weak(at.information, weak_below=weak_below)
+        )
 
     def _conflict(self, features: ScanFeatures, pose: Pose) -> float:
         keyframe, at = self._recent.latest
@@ -235,20 +283,8 @@ class Tracker:
             self._noise.add(disagreement)
 
     def _accept(self, pose: Pose, stamp: float, odometry: Pose | None) -> None:
-        dt = stamp - self._stamp
-        if 0.01 < dt < 1.0:  # steps of zero or less occur in real logs
-            self._twist = self._pose.between(pose).to_array() / dt
-            self._twist_span = dt
-            share = dt / (dt + _SMOOTHING_S)
-            self._turn_rate += share * (float(self._twist[2]) - self._turn_rate)
-        elif dt >= 1.0:
-            self._twist, self._turn_rate = np.zeros(3), 0.0
+        self._motion.add(pose, stamp)
         self._pose, self._stamp, self._odometry = pose, stamp, odometry
-        if self._way and not 0.0 <= stamp - self._way[-1][0] < 1.0:
-            self._way.clear()
-        self._way.append((stamp, pose))
-        while stamp - self._way[0][0] > 1.0:
-            self._way.popleft()
 
     def _add_keyframe(self, features: ScanFeatures, cloud: Cloud) -> None:
         """More keyframes in the local map where a noisy lidar makes each worth less."""
@@ -276,14 +312,20 @@ def _unobserved(found: Registration, least: float) -> float | None:
     seen = observe(found.information)
     if seen.lambda_min >= least * seen.lambda_max:
         return None
-    x, y = _weakest(seen)
+    return _weakest(seen)
+
+
+def _weakest(seen: Observability) -> float:
+    """Direction [rad] along which least is known."""
+    x, y = np.linalg.eigh(seen.translation)[1][:, 0].tolist()
     return math.atan2(y, x)
 
 
-def _weakest(seen: Observability) -> tuple[float, float]:
-    """Unit vector along which least is known."""
-    x, y = np.linalg.eigh(seen.translation)[1][:, 0].tolist()
-    return x, y
+def _slid(pose: Pose, due: Pose, axis: float, share: float) -> Pose:
+    """A pose moved along an axis [rad], that share of the way to where another lies."""
+    c, s = math.cos(axis), math.sin(axis)
+    slide = share * (c * (due.x - pose.x) + s * (due.y - pose.y))
+    return Pose(pose.x + slide * c, pose.y + slide * s, pose.theta)
 
 
 def _in_own_axes(found: Registration) -> NDArray[np.float64]:

@@ -37,7 +37,7 @@ def join(site: SiteMap, root: int, keyframe: int) -> ComponentMerged | None:
         _wait(site, candidates, objection)
         return None
     T_A_B, trial = _solved_together(site, a_root, b_root, chosen)
-    figures |= overlap_of_sets(site, chosen, trial.poses)
+    figures |= overlap_of_sets(site, chosen, trial.poses, kin=bool(figures["kin"]))
     if objection := JOINED.objection(config, figures):
         _wait(site, chosen, objection)
         return None
@@ -75,6 +75,7 @@ def _figures(site: SiteMap, chosen: list[Constraint], rival: list[Constraint]) -
         "known_places": float(min(map(site.places_in_component, ends), default=0)),
         "set_evidence": float(sum(c.evidence for c in chosen)),
         "rival_evidence": float(sum(c.evidence for c in rival)),
+        "kin": float(bool(ends) and site.are_kin(*ends)),
     }
 
 

@@ -24,6 +24,9 @@ from lineloom_core.places import Place, count_steady_each_way, missing_share
 
 _MEMBERS = 8  # keyframes on either side of a step that are held against each other
 _LEAST_BEFORE = 4
+_LONG, _A_DOOR = 0.6, 10
+"""From so long a step [m] on, points (cells of 0.1 m) gone each way that say nothing: the two scans
+see round other corners, and a door on the way was opened."""
 _BESIDE = 2  # steps on either side that a suspect stands out from
 
 
@@ -35,7 +38,9 @@ def jump(site: SiteMap, place: Place) -> Constraint | None:
         ways = _each_way(site, track, at)
         if min(map(sum, ways)) < config.jump_points:
             continue
-        share = math.sqrt(math.prod(missing_share(*way) for way in ways))
+        doors = _A_DOOR if _is_long(site, track, at) else 0
+        gone = ((seen, max(missing - doors, 0)) for seen, missing in ways)
+        share = math.sqrt(math.prod(missing_share(*way) for way in gone))
         if is_doubted(site, {"jump_missing": share}):
             step = site.constraints[site.id_of("step", track.keyframes[at])]
             return withdrawn(site, step, {"jump_missing": share})
@@ -58,6 +63,11 @@ def _suspects(site: SiteMap, track: Track, place: Place) -> list[int]:
         if conflict >= site.config.doubt.jump_conflict and conflict == max(around):
             found.append(at)
     return found
+
+
+def _is_long(site: SiteMap, track: Track, at: int) -> bool:
+    step = site.step(track.keyframes[at])
+    return step is not None and math.hypot(step.T_a_b.x, step.T_a_b.y) > _LONG
 
 
 def _conflict(site: SiteMap, keyframe: int) -> float:
