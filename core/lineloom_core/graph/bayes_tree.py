@@ -23,7 +23,7 @@ from lineloom_core.graph.growth import Growth
 Purpose = Literal["poses", "drift"]
 """What a tree is for: poses, edges weighed as robust ones; or drift, by `drift_information`."""
 
-_RELINEARISE = 0.05  # m, rad: a pose that moves by more is linearised anew
+_RELINEARISE = 0.01  # m, rad: a pose that moves by more is linearised anew
 _WILDFIRE = 1e-4  # m, rad: changes below that are not handed on
 _FAR = 0.1
 """m, rad: where a pose has moved by more, all are linearised anew at once."""
