@@ -62,7 +62,7 @@ class TrackerConfig:
     farthest_gap: float = parameter(
         15.0, "intervals", "silence after which the pairwise matcher has to be sure", 1.0
     )
-    least_wall: float = parameter(2.0, "m", "of wall that a searched scan fits on")
+    least_wall: float = parameter(1.2, "m", "of wall that a searched scan fits on")
     least_matched: float = parameter(
         0.12, "share", "of all of a searched scan on known surfaces", 0.0, 1.0
     )

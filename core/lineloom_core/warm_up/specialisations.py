@@ -30,7 +30,7 @@ class Specialisation:
 
     @property
     def task(self) -> str:
-        """What it is part of: features, matching, places, graph or fusion."""
+        """What it is part of: features, matching, places or fusion."""
         return self.kernel.partition(".")[0]
 
     def compile(self) -> None:
@@ -88,7 +88,6 @@ MAPPING = _parsed(f"""
     matching._covariance_kernels.scan_noise      | S S F1 f f F2 F2
     features._circle_kernels.find_circles        | F2 I1 B1 F2 i f i
     matching._proposal_kernels.propose           | F2 I2 F3 F2 I2 F3 i i f i f f f
-    graph._elimination_kernels.minimum_degree    | i I2
     matching._circle_match_kernels.propose_circles | F2 F2 F2 F2 F2 i i f f
     features._kernels.extract                    | F1r f f f f f f i f i f f
     matching._band_kernels.propose_slides        | S S F2 i F1 i i
@@ -99,23 +98,17 @@ MAPPING = _parsed(f"""
     matching._spot_kernels.settle_spots          | J2 F2 f f F2 F2 F1 F2 f i f S L i f f
     matching._wide_search_kernels.search_widely  | U2 f f U2 f f F2 F1 f i
     matching._registration_kernels.register      | J2 F2 f f F2 F2 F1 F1 F1 f f i
-    graph._residual_kernels.linearise            | F2 I2 F2 F3 F1 F1 I2 I1 F2 F3 F3 b
     fusion._kernels.merge_pass                   | F2 I1 f f f f
-    graph._elimination_kernels.diagonal_of_inverse | F3 F3 I1 I1
     places._kernels.judge_places                 | F2 F2 F1 F1 F2 F2 F2 F1 F1 F2 F1 i f f F1
     fusion._persistence_kernels.balances         | F2 I1 F2 F2 I1 F1 f f f i i f f F1
-    graph._elimination_kernels.substitute        | F3 F3 I1 I1 F2 i
-    graph._elimination_kernels.factorise         | F3 F3 I1 I1 F2
     matching._free_space_kernels.judge_pair      | F2 F1r f f F2 F1r f f F1 i f f F1
     places._kernels.tally_sweeps                 | F2 F1 F2 F1 F1 F2 f f F2
     matching._wide_search_kernels.coarse_field   | F2 f f i i
     matching._registration_kernels.insert_points | J2 F2 i f f F2 F2 F1 f
     matching._registration_kernels.correlate     | U2 f f F2 F1 f f f f f
-    graph._residual_kernels.move                 | F2 i I1 F2
     matching._registration_kernels.fill_field    | U2 F2 i f f
     features._kernels.point_normals              | F2 B1 i
     fusion._kernels.extents                      | F2 I1 F2
-    graph._elimination_kernels.slots_of          | I2 I1 I1
     matching._registration_kernels.thin          | F2 f i
     matching._registration_kernels.line_normals  | F2 I1 F2 F2
     matching._registration_kernels.bounds        | F2 F1 f F1

@@ -12,8 +12,8 @@ from lineloom_core.warm_up import compiling
 from lineloom_core.warm_up.compiling import Compiler, Progress, is_compiled
 from lineloom_core.warm_up.specialisations import Specialisation
 
-MOVE = Specialisation("graph._residual_kernels.move", "F2 i I1 F2")
-SLOTS = Specialisation("graph._elimination_kernels.slots_of", "I2 I1 I1")
+THIN = Specialisation("matching._registration_kernels.thin", "F2 f i")
+NORMALS = Specialisation("features._kernels.point_normals", "F2 B1 i")
 EXTENTS = Specialisation("fusion._kernels.extents", "F2 I1 F2")
 
 
@@ -21,7 +21,7 @@ EXTENTS = Specialisation("fusion._kernels.extents", "F2 I1 F2")
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """An empty cache, and a table of three small kernels."""
     monkeypatch.setenv(folders.SETTING, str(tmp_path))
-    monkeypatch.setattr(compiling, "MAPPING", (MOVE, SLOTS))
+    monkeypatch.setattr(compiling, "MAPPING", (THIN, NORMALS))
     monkeypatch.setattr(compiling, "REST", (EXTENTS,))
     folders.writable.cache_clear()
     yield tmp_path
@@ -34,12 +34,12 @@ def test_all_is_compiled_once_and_mapping_first(cache: Path) -> None:
     Compiler(told.append, processes=2).run()
     assert is_compiled()
     names = [file.name.partition("-")[0] for file in cache.rglob("*.nbc")]
-    assert {"move", "slots_of", "extents"} <= set(names)
+    assert {"thin", "point_normals", "extents"} <= set(names)
     assert len(names) == len(set(names))
     assert not list(cache.rglob("*.lock"))
     assert [p.maps for p in told] == sorted(p.maps for p in told)
     assert (told[-1].done, told[-1].of, told[-1].maps) == (3, 3, True)
-    assert str(told[0]) == "0 of 3, now graph"
+    assert str(told[0]) == "0 of 3, now matching"
 
     files = {file: file.stat().st_mtime_ns for file in cache.rglob("*.nbc")}
     Compiler(processes=1).run()
@@ -47,7 +47,7 @@ def test_all_is_compiled_once_and_mapping_first(cache: Path) -> None:
 
 
 def test_one_that_fails_is_an_error_and_leaves_no_mark(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compiling, "MAPPING", (Specialisation("graph._residual_kernels.no", "f"),))
+    monkeypatch.setattr(compiling, "MAPPING", (Specialisation("features._kernels.no", "f"),))
     with pytest.raises(RuntimeError, match="ended with 1"):
         Compiler(processes=1).run()
     assert not is_compiled()

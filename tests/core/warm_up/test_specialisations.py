@@ -53,8 +53,8 @@ def test_a_drive_calls_nothing_that_is_not_in_the_table() -> None:
 
 
 def test_what_is_missing_in_the_table_is_seen() -> None:
-    assert list(_gained("graph._residual_kernels.move")) == [
-        "lineloom_core.graph._residual_kernels.move"
+    assert list(_gained("matching._registration_kernels.thin")) == [
+        "lineloom_core.matching._registration_kernels.thin"
     ]
 
 
@@ -64,4 +64,4 @@ def test_nothing_is_in_the_table_twice() -> None:
 
 def test_arguments_that_a_kernel_does_not_take_are_refused() -> None:
     with pytest.raises(TypeError):
-        Specialisation("graph._residual_kernels.move", "f").compile()
+        Specialisation("matching._registration_kernels.thin", "f").compile()
