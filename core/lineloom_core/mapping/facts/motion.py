@@ -1,7 +1,8 @@
 """What a robot's next step may be: like its last ones, give or take what its clock tells.
 
-A clock is a prior with a width and never a gate. Only ratios of its intervals count, so it may run
-in any unit; where it stands still or goes back it says nothing, and a step is like the last one.
+A clock is a prior with a width: only ratios of its intervals count, so it may run in any unit;
+where it stands still or goes back it says nothing, and a step is like the last one. Who asks may
+still end a track after `tracker.longest_silence`, for then the robot may have been carried.
 """
 
 from __future__ import annotations
