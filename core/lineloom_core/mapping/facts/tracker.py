@@ -139,14 +139,7 @@ class Tracker:
         if trusted and unseen is not None:
             due = expected.predictions[-1]
         at = _without_last_bits(self._held(found, due, expected))
-        checks = {
-            "fit": at.fit,
-            "conflict_share": self._conflict(features, at.pose),
-            # A scan that was skipped is as good as a pause.
-            "gap": max(expected.gap, _SKIPPED * self._misses),
-            "noise": self._noise.value,
-            **found.figures,
-        }
+        checks = self._figures(features, at, expected) | found.figures
         if TRACKED.against(self._config, checks):
             self._misses += 1
             status: Status = "lost" if self._misses >= self._config.patience else "skipped"
@@ -160,6 +153,18 @@ class Tracker:
         known = self._known_of(expected, trusted)
         information = _in_own_axes(at)
         return Tracked("tracked", at.pose, moved_on, information, checks, self._noise.value, known)
+
+    def _figures(
+        self, features: ScanFeatures, at: Registration, expected: Expected
+    ) -> dict[str, float]:
+        """What every step is held to."""
+        return {
+            "fit": at.fit,
+            "conflict_share": self._conflict(features, at.pose),
+            # A scan that was skipped is as good as a pause.
+            "gap": max(expected.gap, _SKIPPED * self._misses),
+            "noise": self._noise.value,
+        }
 
     def _moved_on(self, found: Registration, conflict: float) -> bool:
         """Whether the scan is to be a keyframe."""
