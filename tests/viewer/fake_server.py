@@ -120,7 +120,8 @@ class FakeServer:
         async def events() -> Response:
             if not self.streams:
                 return _problem(404, "no such address")
-            return StreamingResponse(self._events(), media_type="text/event-stream")
+            news = self._events(site.version, site.told())  # of before the page knows it is open
+            return StreamingResponse(news, media_type="text/event-stream")
 
         @router.get(f"{_SITE}/floorplan")
         def floorplan() -> Any:
@@ -168,9 +169,8 @@ class FakeServer:
 
         return router
 
-    async def _events(self) -> AsyncIterator[str]:
+    async def _events(self, told: int, before: dict[str, dict[str, Any]]) -> AsyncIterator[str]:
         """For every new version what has changed, a map with it; or else what `tell` was given."""
-        told, before = self.site.version, self.site.told()
         yield ": here we are\n\n"
         server = self._server
         while server is not None and not server.should_exit:

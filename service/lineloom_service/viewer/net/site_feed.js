@@ -103,6 +103,8 @@ export class SiteFeed {
       const state = await this._reader.state(due);
       if (this._stopped) return;
       this._version = state.version;
+      this._remaking = Boolean(state.site.remaking);
+      this._listener.onSite(state.site); // what came up between the two answers
       this._listener.onState(state);
     } else if (changed || due.robots) {
       const robots = await this._reader.robots();
