@@ -26,15 +26,16 @@ class Observability:
     """What an information matrix constrains, in the axes in which it is given.
 
     translation: (2, 2) [1/m^2], the information on x and y when the angle is unknown (Schur
-    complement). lambda_min, lambda_max: its eigenvalues. weak_direction: angle in [0, pi) [rad] of
-    the least known direction, None where all are known well enough. weak_translation: how many of
-    the two directions are weak. rotation: information on the angle when the translation is unknown
-    [1/rad^2]. weak_rotation: too little of it.
+    complement). lambda_min, lambda_max: its eigenvalues. least_known: angle in [0, pi) [rad] of
+    the direction known least; weak_direction: the same, None where all are known well enough.
+    weak_translation: how many of the two directions are weak. rotation: information on the angle
+    when the translation is unknown [1/rad^2]. weak_rotation: too little of it.
     """
 
     translation: NDArray[np.float64]
     lambda_min: float
     lambda_max: float
+    least_known: float
     weak_direction: float | None
     weak_translation: int
     rotation: float
@@ -54,24 +55,40 @@ def observe(
     """Judge a (3, 3) information matrix, order x, y, theta. Raises ValueError for another shape."""
     if information.shape != (3, 3):
         raise ValueError("information must be 3x3")
-    translation = _without(information, np.eye(3)[2])[:2, :2]
-    values, vectors = np.linalg.eigh(translation)
-    x, y = vectors[:, 0].tolist()
+    (xx, xy, xt), (_, yy, yt), (_, _, tt) = information.tolist()
+    rotation = tt
+    for known, x, y in _axes(xx, xy, yy):
+        if known > _NOTHING:
+            rotation -= (x * xt + y * yt) ** 2 / known
+    if tt > _NOTHING:
+        xx, xy, yy = xx - xt * xt / tt, xy - xt * yt / tt, yy - yt * yt / tt
+    (least, x, y), (most, _, _) = _axes(xx, xy, yy)
     direction = math.atan2(y, x) % math.pi
-    weak = int(np.count_nonzero(values < weak_below))
-    without_translation = information
-    for axis in np.linalg.eigh(information[:2, :2])[1].T:
-        without_translation = _without(without_translation, np.array([axis[0], axis[1], 0.0]))
-    rotation = max(float(without_translation[2, 2]), 0.0)
+    direction = 0.0 if direction >= math.pi else direction
+    weak = (least < weak_below) + (most < weak_below)
     return Observability(
-        translation=translation,
-        lambda_min=max(float(values[0]), 0.0),
-        lambda_max=max(float(values[1]), 0.0),
-        weak_direction=(0.0 if direction >= math.pi else direction) if weak else None,
+        translation=np.array([[xx, xy], [xy, yy]]),
+        lambda_min=max(least, 0.0),
+        lambda_max=max(most, 0.0),
+        least_known=direction,
+        weak_direction=direction if weak else None,
         weak_translation=weak,
-        rotation=rotation,
+        rotation=max(rotation, 0.0),
         weak_rotation=rotation < weak_rotation_below,
     )
+
+
+def _axes(xx: float, xy: float, yy: float) -> tuple[tuple[float, float, float], ...]:
+    """Eigenvalues and unit eigenvectors (value, x, y) of a symmetric 2x2 matrix, the least first.
+
+    By the closed form: this is asked several times a scan, and a library's solver takes longer to
+    call than all of it.
+    """
+    middle, half = 0.5 * (xx + yy), 0.5 * (xx - yy)
+    radius = math.hypot(half, xy)
+    along = 0.5 * math.atan2(xy, half)
+    c, s = math.cos(along), math.sin(along)
+    return (middle - radius, -s, c), (middle + radius, c, s)
 
 
 def project_out_weak(
@@ -87,10 +104,8 @@ def project_out_weak(
     """
     judged = observe(information, weak_below, weak_rotation_below)
     result = 0.5 * (information + information.T)
-    if judged.weak_translation:
-        vectors = np.linalg.eigh(judged.translation)[1]
-        for k in range(judged.weak_translation):
-            result = _without(result, np.array([vectors[0, k], vectors[1, k], 0.0]))
+    for k in range(judged.weak_translation):
+        result = without_direction(result, judged.least_known + k * 0.5 * math.pi)
     if judged.weak_rotation:
         result = _without(result, np.eye(3)[2])
     return result

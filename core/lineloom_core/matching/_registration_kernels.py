@@ -35,12 +35,12 @@ def line_normals(points, beams, lines, normals):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def bounds(points, pose, reach, box):  # type: ignore[no-untyped-def]
-    """Widen box (min x, min y, max x, max y) by the points within `reach` of the laser."""
+def bounds(points, kept, pose, reach, box):  # type: ignore[no-untyped-def]
+    """Widen box (min x, min y, max x, max y) by the kept points within `reach` of the laser."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for k in range(points.shape[0]):
         px, py = points[k, 0], points[k, 1]
-        if px * px + py * py > reach * reach:
+        if not kept[k] or px * px + py * py > reach * reach:
             continue
         x, y = c * px - s * py + pose[0], s * px + c * py + pose[1]
         box[0], box[1] = min(box[0], x), min(box[1], y)
@@ -48,8 +48,10 @@ def bounds(points, pose, reach, box):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def insert_points(index, surface, used, ox, oy, points, normals, pose, reach):  # type: ignore[no-untyped-def]
-    """Add points (laser frame at `pose`) to the cells; returns the number of rows in use.
+def insert_points(  # type: ignore[no-untyped-def]
+    index, surface, used, ox, oy, points, normals, kept, pose, reach
+):
+    """Add the kept points (laser frame at `pose`) to the cells; returns the number of rows in use.
 
     A cell keeps the mean of the points whose normals agree with the first one's.
     """
@@ -57,7 +59,7 @@ def insert_points(index, surface, used, ox, oy, points, normals, pose, reach):  
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for k in range(points.shape[0]):
         px, py = points[k, 0], points[k, 1]
-        if px * px + py * py > reach * reach:
+        if not kept[k] or px * px + py * py > reach * reach:
             continue
         x, y = c * px - s * py + pose[0], s * px + c * py + pose[1]
         gx, gy = math.floor((x - ox) / CELL), math.floor((y - oy) / CELL)
@@ -115,6 +117,37 @@ def fill_field(field, surface, used, ox, oy):  # type: ignore[no-untyped-def]
         for a in range(max(gx - 2, 0), min(gx + 3, nx_cells)):
             for b in range(max(gy - 2, 0), min(gy + 3, ny_cells)):
                 field[a, b] = max(field[a, b], stamp[a - gx + 2, b - gy + 2])
+
+
+@kernel
+def build(points, normals, kept, begins, poses, reach, searchable):  # type: ignore[no-untyped-def]
+    """Merge clouds, first come first served; returns index, surface, field, ox, oy.
+
+    points, normals (n, 2): of all, one after the other, those `kept` (n,); begins (k + 1,): where
+    each cloud's begin; poses (k, 3). Without `searchable` the field stays empty.
+    """
+    box = np.array([np.inf, np.inf, -np.inf, -np.inf])
+    for q in range(poses.shape[0]):
+        of = slice(begins[q], begins[q + 1])
+        bounds(points[of], kept[of], poses[q], reach, box)
+    if not np.all(np.isfinite(box)):
+        box[:] = 0.0
+    margin = 3.5 * CELL  # the outermost points, too, lie amid their cells
+    ox, oy = box[0] - margin, box[1] - margin
+    nx = math.ceil((box[2] + margin - ox) / CELL)
+    ny = math.ceil((box[3] + margin - oy) / CELL)
+    index = np.full((nx, ny), np.int32(-1))
+    surface = np.empty((points.shape[0] + 1, 5))
+    used = 0
+    for q in range(poses.shape[0]):
+        of = slice(begins[q], begins[q + 1])
+        used = insert_points(
+            index, surface, used, ox, oy, points[of], normals[of], kept[of], poses[q], reach
+        )
+    field = np.zeros((nx, ny) if searchable else (0, 0), dtype=np.uint8)
+    if searchable:
+        fill_field(field, surface, used, ox, oy)
+    return index, surface[:used].copy(), field, ox, oy
 
 
 @kernel

@@ -24,6 +24,10 @@ UNMATCHED, STANDS_FREE, SEES_THROUGH = 10.0, 14.0, 10.0
 keyframes saw as free, and theirs in what it saw as free itself."""
 LEAST_JUDGED = 0.2
 """Share of all points that counts as judged at least: a few in conflict are no contradiction."""
+APPROACHED = 150, 5
+"""Points of a scan, and iterations, with which a spot is approached before all points decide."""
+CLOSE = 0.12
+"""Gate [m] of what follows."""
 HELD = 4.0
 """Information [1/m^2, 1/rad^2] that holds a spot at its seed where the scan says nothing."""
 SPOT_COLUMNS = 16
@@ -83,17 +87,30 @@ def settle_spots(  # type: ignore[no-untyped-def]
     index, surface, ox, oy, points, normals, weights, seeds, gate, iterations, near,
     scan, latest, most_back, base, slope,
 ):  # fmt: skip
-    """Register every seed (n, 3) on the local map and judge where it settles; each spot once."""
+    """Register every seed (n, 3) on the local map and judge where it settles; each spot once.
+
+    First by a part of the points, until the gate is CLOSE: a wide gate is what costs.
+    """
     out = np.empty((seeds.shape[0], SPOT_COLUMNS))
     prior = np.full(3, HELD)
     weight = max(weights.sum(), 1e-9)
+    every = max(1, points.shape[0] // APPROACHED[0])
+    few, few_normals, few_weights = points[::every], normals[::every], weights[::every]
     count = 0
     for k in range(seeds.shape[0]):
         if near > 0.0 and is_listed(seeds, k, seeds[k], near):
             continue
+        pose = seeds[k].copy()
+        if iterations > 0 and every > 1:
+            pose, H, stats = register(
+                index, surface, ox, oy, few, few_normals, few_weights, pose, prior, gate, 0.03,
+                APPROACHED[1],
+            )  # fmt: skip
+            if near > 0.0 and is_listed(out, count, pose, near):
+                continue
         pose, H, stats = register(
-            index, surface, ox, oy, points, normals, weights, seeds[k], prior, gate, 0.03,
-            iterations,
+            index, surface, ox, oy, points, normals, weights, pose, prior,
+            CLOSE if iterations > 0 and every > 1 else gate, 0.03, iterations,
         )  # fmt: skip
         if near > 0.0 and is_listed(out, count, pose, near):
             continue

@@ -28,14 +28,16 @@ def coarse_field(surface, ox, oy, nx, ny):  # type: ignore[no-untyped-def]
     """Likelihood field (nx, ny) of COARSE metres a cell, 255 on a surface."""
     field = np.zeros((nx, ny), dtype=np.uint8)
     inv = 1.0 / COARSE
+    levels = np.empty(1300, dtype=np.uint8)  # over the squared distance, in hundredths of a cell
+    for q in range(levels.shape[0]):
+        levels[q] = int(255.0 * math.exp(-0.5 * (q + 0.5) / 100.0 * (COARSE / SPREAD) ** 2))
     for row in range(surface.shape[0]):
         fx, fy = (surface[row, 0] - ox) * inv, (surface[row, 1] - oy) * inv
         gx, gy = math.floor(fx), math.floor(fy)
         for a in range(max(gx - 2, 0), min(gx + 3, nx)):
             for b in range(max(gy - 2, 0), min(gy + 3, ny)):
-                d = math.hypot(a + 0.5 - fx, b + 0.5 - fy) * COARSE
-                v = int(255.0 * math.exp(-0.5 * (d / SPREAD) ** 2))
-                field[a, b] = max(field[a, b], v)
+                d2 = (a + 0.5 - fx) ** 2 + (b + 0.5 - fy) ** 2
+                field[a, b] = max(field[a, b], levels[int(100.0 * d2)])
     return field
 
 

@@ -65,6 +65,9 @@ class Cloud:
         return Cloud(self.points[kept], self.normals[kept], self.weights[kept], self.sparse[:0])
 
 
+_NO_CLOUD = Cloud(*(np.empty(shape) for shape in ((0, 2), (0, 2), 0, (0, 2))))
+
+
 @dataclass(frozen=True, eq=False)
 class LocalMap:
     """A grid of averaged surface points with normals (see `_registration_kernels`).
@@ -81,33 +84,25 @@ class LocalMap:
 
     @staticmethod
     def build(
-        clouds: Iterable[tuple[Cloud, Pose]], *, reach: float = 18.0, searchable: bool = True
+        clouds: Iterable[tuple[Cloud, Pose]],
+        *,
+        kept: NDArray[np.bool_] | None = None,
+        reach: float = 18.0,
+        searchable: bool = True,
     ) -> LocalMap:
         """Merge clouds at their poses, first come first served; points up to `reach` m away.
 
-        Without `searchable` the field stays empty and `search` finds nothing.
+        kept: which points, of all clouds one after the other; None for all. Without `searchable`
+        the field stays empty and `search` finds nothing.
         """
-        rows = [(cloud, pose.to_array()) for cloud, pose in clouds]
-        box = np.array([np.inf, np.inf, -np.inf, -np.inf])
-        for cloud, pose in rows:
-            _kernels.bounds(cloud.points, pose, reach, box)
-        if not np.all(np.isfinite(box)):
-            box = np.zeros(4)
-        margin = 3.5 * _kernels.CELL  # the outermost points, too, lie amid their cells
-        ox, oy = float(box[0] - margin), float(box[1] - margin)
-        nx = math.ceil((box[2] + margin - ox) / _kernels.CELL)
-        ny = math.ceil((box[3] + margin - oy) / _kernels.CELL)
-        index = np.full((nx, ny), -1, dtype=np.int32)
-        surface = np.empty((sum(len(c.points) for c, _ in rows) + 1, 5))
-        used = 0
-        for cloud, pose in rows:
-            used = _kernels.insert_points(
-                index, surface, used, ox, oy, cloud.points, cloud.normals, pose, reach
-            )
-        field = np.zeros((nx, ny) if searchable else (0, 0), dtype=np.uint8)
-        if searchable:
-            _kernels.fill_field(field, surface, used, ox, oy)
-        return LocalMap(index, surface[:used].copy(), field, ox, oy)
+        rows = [*clouds, (_NO_CLOUD, Pose.identity())]  # one at least to lay beside each other
+        begins = np.cumsum([0, *(len(cloud.points) for cloud, _ in rows)])
+        points = np.concatenate([cloud.points for cloud, _ in rows])
+        normals = np.concatenate([cloud.normals for cloud, _ in rows])
+        poses = np.array([pose.to_array() for _, pose in rows])
+        if kept is None:
+            kept = np.ones(len(points), dtype=np.bool_)
+        return LocalMap(*_kernels.build(points, normals, kept, begins, poses, reach, searchable))
 
     def search(
         self,

@@ -104,14 +104,12 @@ MAPPING = _parsed(f"""
     matching._free_space_kernels.judge_pair      | F2 F1r f f F2 F1r f f F1 i f f F1
     places._kernels.tally_sweeps                 | F2 F1 F2 F1 F1 F2 f f F2
     matching._wide_search_kernels.coarse_field   | F2 f f i i
-    matching._registration_kernels.insert_points | J2 F2 i f f F2 F2 F1 f
+    matching._registration_kernels.build         | F2 F2 B1 I1 F2 f b
     matching._registration_kernels.correlate     | U2 f f F2 F1 f f f f f
-    matching._registration_kernels.fill_field    | U2 F2 i f f
     features._kernels.point_normals              | F2 B1 i
     fusion._kernels.extents                      | F2 I1 F2
     matching._registration_kernels.thin          | F2 f i
     matching._registration_kernels.line_normals  | F2 I1 F2 F2
-    matching._registration_kernels.bounds        | F2 F1 f F1
     matching._hypothesis.turn_information        | f f f f f f
     matching._free_space_kernels.judge_each      | F2 F1 F1r f f f f I1
     matching._free_space_kernels.judge_cloud     | F2 i F1 F2 F1 F1 F2 f f F1

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 CELL = 0.1
 REACH = 18.0
+ALL = np.ones(4, dtype=np.bool_)
 Surface = dict[tuple[int, int], list[float]]
 
 
@@ -80,21 +81,37 @@ def test_a_cell_trusts_the_first_normal_and_one_more_than_none() -> None:
     used = 0
     for x, n in given:
         p, normal = np.array([[x, 0.05]]), np.array([n])
-        used = fast.insert_points(index, surface, used, 0.0, 0.0, p, normal, np.zeros(3), REACH)
+        used = fast.insert_points(
+            index, surface, used, 0.0, 0.0, p, normal, ALL[:1], np.zeros(3), REACH
+        )
         slow_insert(expected, (0, 0), p[0], normal[0])
     np.testing.assert_allclose(surface[:used], list(expected.values()))
     np.testing.assert_allclose(surface[0], [0.035, 0.05, 0.0, 1.0, 2.0])
+
+
+def test_a_map_of_some_points_is_that_of_clouds_that_have_no_others(
+    clouds: list[tuple[Cloud, Pose]],
+) -> None:
+    rng = np.random.default_rng(3)
+    masks = [rng.random(len(cloud.points)) < 0.6 for cloud, _ in clouds]
+    built = LocalMap.build(clouds, kept=np.concatenate(masks))
+    less = [(cloud.only(m), pose) for (cloud, pose), m in zip(clouds, masks, strict=True)]
+    expected = LocalMap.build(less)
+    np.testing.assert_array_equal(built.surface, expected.surface)
+    np.testing.assert_array_equal(built.index, expected.index)
+    np.testing.assert_array_equal(built.field, expected.field)
+    assert (built.ox, built.oy) == (expected.ox, expected.oy)
 
 
 def test_points_beyond_reach_or_grid_are_left_out() -> None:
     index, surface = np.full((5, 5), -1, dtype=np.int32), np.empty((4, 5))
     points = np.array([[0.25, 0.25], [-0.01, 0.2], [0.2, 0.51], [0.45, 0.45]])
     normals = np.zeros((4, 2))
-    used = fast.insert_points(index, surface, 0, 0.0, 0.0, points, normals, np.zeros(3), 0.5)
+    used = fast.insert_points(index, surface, 0, 0.0, 0.0, points, normals, ALL, np.zeros(3), 0.5)
     assert used == 1
     np.testing.assert_array_equal(np.argwhere(index >= 0), [[2, 2]])
     box = np.array([np.inf, np.inf, -np.inf, -np.inf])
-    fast.bounds(points, np.array([1.0, 2.0, math.pi / 2]), 0.6, box)
+    fast.bounds(points, ALL, np.array([1.0, 2.0, math.pi / 2]), 0.6, box)
     np.testing.assert_allclose(box, [0.49, 1.99, 0.8, 2.25])
 
 

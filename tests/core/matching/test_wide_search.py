@@ -93,7 +93,8 @@ def on_a_small_map(seed: int) -> tuple[Floats, NDArray[np.uint8], Floats]:
 @pytest.mark.parametrize("seed", range(4))
 def test_the_coarse_field_is_worth_the_nearest_surface(seed: int) -> None:
     surface, field, _ = on_a_small_map(seed)
-    np.testing.assert_array_equal(field, slow_field(surface, (-1.0, -2.0), (20, 16)))
+    slow = slow_field(surface, (-1.0, -2.0), (20, 16))
+    np.testing.assert_allclose(field, slow, atol=2.0)  # distances are looked up by hundredths
     assert field.max() > 200
 
 

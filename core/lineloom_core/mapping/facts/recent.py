@@ -23,6 +23,7 @@ from lineloom_core.matching.free_space import seen_by
 from lineloom_core.matching.local_map import Cloud, LocalMap
 
 _MOST_MISSES = 0.25  # times as often as a steady point was measured it may have been seen through
+_NONE = np.zeros(0, dtype=np.int64)
 
 
 @storable("recent-keyframe")
@@ -43,12 +44,6 @@ class _Kept:
         )
         self.hits += measured
         self.misses += through
-
-    @property
-    def steady(self) -> NDArray[np.bool_]:
-        """Which points stood still."""
-        still: NDArray[np.bool_] = (self.hits > 0) & (self.misses <= _MOST_MISSES * self.hits)
-        return still
 
 
 @storable("recent", _compared=int, _kept=deque[_Kept], _depth=int)
@@ -91,9 +86,11 @@ class Recent:
 
     def _build(self) -> None:
         latest = list(islice(reversed(self._kept), self._depth))
-        self.map = LocalMap.build((k.cloud, k.pose) for k in latest)
+        clouds = [(k.cloud, k.pose) for k in latest]
+        self.map = LocalMap.build(clouds)
         """All that was seen."""
-        self.steady = LocalMap.build(
-            ((k.cloud.only(k.steady), k.pose) for k in latest), searchable=False
-        )
+        hits = np.concatenate([_NONE, *(k.hits for k in latest)])
+        misses = np.concatenate([_NONE, *(k.misses for k in latest)])
+        still = (hits > 0) & (misses <= _MOST_MISSES * hits)
+        self.steady = LocalMap.build(clouds, kept=still, searchable=False)
         """What stood still."""

@@ -7,8 +7,9 @@ other way round, how surprising the step is, and whether the matcher backs it; 4
 direction the best could slide, and how far it leads any other that is no slide of it.
 
 Where the matcher is certain of the latest keyframe and nothing speaks against it, step 1 ends
-there. What matters most is in the order of design §6: the matcher on several keyframes, the motion,
-free space both ways.
+there; it asks the keyframes before only where what was found so far has a rival or could slide.
+What matters most is in the order of design §6: the matcher on several keyframes, the motion, free
+space both ways.
 """
 
 from __future__ import annotations
@@ -16,8 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-
-import numpy as np
+from functools import partial
 
 from lineloom_core.features import ScanFeatures
 from lineloom_core.geometry import Pose, angle_difference
@@ -42,9 +42,11 @@ _SLIDES = (-0.8, -0.4, 0.4, 0.8)  # m
 _SLIDE_GATE = 0.15  # m
 _SLIDE_COST = 1.0  # a slide that costs less is open
 _APART, _TURNED = 0.3, 0.15  # m, rad: from here on another spot is a rival
-_CERTAIN = 4.0  # misfit up to which a certain match needs no rival
+_CERTAIN = 6.0  # misfit up to which a certain match needs no rival
 _NO_SURPRISE = 2.0
+_CLEAR = 8.0, 6.0  # misfit, and lead, from which on no further keyframe is compared
 _NO_RIVAL = 99.0
+_ROUND = 0.3  # share of the most that is known that must be known along every direction: no slide
 
 _MATCHER = LineMatcher()
 _Match = tuple[MatchResult, Pose]
@@ -71,23 +73,41 @@ def search_step(
     """Find where a scan was taken; `last`: the pose of the scan before."""
     latest = Latest.of(recent.last(_COMPARED))
     spotter = Spotter(recent.map, latest, Sweep.of(features), cloud, _COMPARED_BACK)
+    judge = partial(_judged, last=last, expected=expected)
     matches = _matches(recent, features, 0, 1)
-    seeds = [at @ r.best for r, at in matches if r.verdict == "match" and r.best is not None]
-    found = _judged(spotter.settle(seeds), last, expected, matches)
-    if expected.gap > PAUSE or not found or not _is_certain(found[0][1], expected):
-        matches += _matches(recent, features, 1, _COMPARED)
+    spots = spotter.settle(at @ r.best for r, at in matches if r.verdict == "match" and r.best)
+    if expected.gap > PAUSE or not _is_certain(spots, expected):
         seeds = [*expected.predictions, last, *_of_matches(matches)]
         seeds += recent.map.search_around(cloud, last, reach=_REACH, most=_SEEDS)
-        found = _judged(spotter.settle(seeds), last, expected, matches)
+        spots = spotter.settle(seeds)
+        if expected.gap > PAUSE or not _is_clear(spotter, judge(spots, matches=matches)):
+            more = _matches(recent, features, 1, _COMPARED)
+            matches += more
+            spots += spotter.settle(_of_matches(more))
+    found = judge(spots, matches=matches)
+    best, axis = found[0][1], _open_axis(spotter, found[0][1])
+    return Searched(best, _lead(found, axis), axis, _backing(best.pose, matches))
+
+
+def _is_certain(spots: Sequence[Spot], expected: Expected) -> bool:
+    """Whether the latest keyframe alone says where a scan was taken, and nothing speaks against."""
+    return any(
+        spot.misfit < _CERTAIN and expected.surprise(spot.pose) < _NO_SURPRISE for spot in spots
+    )
+
+
+def _is_clear(spotter: Spotter, found: Sequence[tuple[float, Spot]]) -> bool:
+    """Whether the best leads so far, any way that it could slide, that no keyframe changes it."""
+    best = found[0][1]
+    clear = best.misfit < _CLEAR[0] and _lead(found, None) > _CLEAR[1]
+    return clear and _open_axis(spotter, best) is None
+
+
+def _lead(found: Sequence[tuple[float, Spot]], axis: float | None) -> float:
+    """How much less speaks against the first than against any other that is no slide of it."""
     cost, best = found[0]
-    axis = _open_axis(spotter, best)
     rivals = (c for c, s in found[1:] if _is_rival(s.pose, best.pose, axis))
-    lead = min(rivals, default=cost + _NO_RIVAL) - cost
-    return Searched(best, lead, axis, _backing(best.pose, matches))
-
-
-def _is_certain(spot: Spot, expected: Expected) -> bool:
-    return spot.misfit < _CERTAIN and expected.surprise(spot.pose) < _NO_SURPRISE
+    return min(rivals, default=cost + _NO_RIVAL) - cost
 
 
 def _matches(recent: Recent, features: ScanFeatures, begin: int, end: int) -> list[_Match]:
@@ -120,13 +140,15 @@ def _judged(
 
 def _open_axis(spotter: Spotter, best: Spot) -> float | None:
     """Step 4: the direction along which hardly anything speaks against a slide."""
-    seen = observe(best.found.information)
-    x, y = np.linalg.eigh(seen.translation)[1][:, 0].tolist()
-    at = best.pose
-    slides = [Pose(at.x + way * x, at.y + way * y, at.theta) for way in _SLIDES]
+    seen, at = observe(best.found.information), best.pose
+    if seen.lambda_min > _ROUND * seen.lambda_max:
+        return None
+    axis = seen.least_known
+    c, s = math.cos(axis), math.sin(axis)
+    slides = [Pose(at.x + way * c, at.y + way * s, at.theta) for way in _SLIDES]
     for there in spotter.settle(slides, gate=_SLIDE_GATE, iterations=0, near=0.0):
         if there.misfit - best.misfit < _SLIDE_COST:
-            return math.atan2(y, x)
+            return axis
     return None
 
 

@@ -30,7 +30,7 @@ from lineloom_core.checks import TRACKED
 from lineloom_core.codec import storable
 from lineloom_core.features import ScanFeatures
 from lineloom_core.geometry import Pose
-from lineloom_core.graph import Observability, observe, project_out_weak, without_direction
+from lineloom_core.graph import observe, project_out_weak, without_direction
 from lineloom_core.mapping.config import TrackerConfig
 from lineloom_core.mapping.facts.drift import MEASURED_SHORT, NoiseFigure
 from lineloom_core.mapping.facts.motion import Expected, Motion
@@ -272,7 +272,7 @@ class Tracker:
         way = max(self._motion.usual_way / _USUAL_WAY, 1.0)
         sigma = config.prior_sigma * way * max(expected.gap, 1.0)
         known = seen.lambda_min / (MEASURED_SHORT * max(self._noise.value, 1e-3))
-        pose = _slid(at.pose, due, _weakest(seen), 1.0 / (1.0 + known * sigma**2))
+        pose = _slid(at.pose, due, seen.least_known, 1.0 / (1.0 + known * sigma**2))
         weak_below = config.least_isotropy * seen.lambda_max
         return replace(
             at, pose=pose, information=project_out_weak(at.information, weak_below=weak_below)
@@ -317,13 +317,7 @@ def _unobserved(found: Registration, least: float) -> float | None:
     seen = observe(found.information)
     if seen.lambda_min >= least * seen.lambda_max:
         return None
-    return _weakest(seen)
-
-
-def _weakest(seen: Observability) -> float:
-    """Direction [rad] along which least is known."""
-    x, y = np.linalg.eigh(seen.translation)[1][:, 0].tolist()
-    return math.atan2(y, x)
+    return seen.least_known
 
 
 def _slid(pose: Pose, due: Pose, axis: float, share: float) -> Pose:
