@@ -181,6 +181,15 @@ def test_surprise_grows_and_its_tails_are_heavy() -> None:
     assert not expected.explains(Pose(0.0, 0.0, 0.21))
 
 
+def test_a_step_is_like_another_in_way_and_turn_together() -> None:
+    turn, drive = Pose(0.0, 0.0, -0.7), Pose(2.0, 0.0, 0.1)
+    expected = Expected((turn, drive), 0.6, 0.5, 1.0, False)
+    short = Pose(0.4, 0.0, 0.0)  # nearer to the turn's way, but no turn
+    assert expected.nearest(short) == turn
+    assert expected.surprise(short) > 1.0
+    assert expected.surprise(Pose(2.4, 0.0, 0.0)) < 0.5
+
+
 def test_what_wheels_say_comes_last() -> None:
     motion, due = steadily(UNEVEN)
     rolled = Pose(9.0, 9.0, 1.0)

@@ -195,7 +195,9 @@ class SiteMap:
         The way driven on one track; across tracks, or where loops have closed, the error is that
         of the shorter way: a few times the distance.
         """
-        straight = self.pose(a).distance(self.pose(b))
+        return self._way(a, b, self.pose(a).distance(self.pose(b)))
+
+    def _way(self, a: int, b: int, straight: float) -> float:
         around = 3.0 * straight + 5.0
         if not self.same_track(a, b):
             return around
@@ -226,7 +228,8 @@ class SiteMap:
         """
         first, last = self._track_of[a].drift_rates(), self._track_of[b].drift_rates()
         rates = 0.5 * (first[0] + last[0]), 0.5 * (first[1] + last[1])
-        return way_drift(rates, self.way_between(a, b), self.pose(a).distance(self.pose(b)))
+        straight = self.pose(a).distance(self.pose(b))
+        return way_drift(rates, self._way(a, b, straight), straight)
 
     def add_constraint(self, constraint: Constraint) -> None:
         """Remember a constraint; an accepted one goes into the graph."""

@@ -123,9 +123,10 @@ def way_drift(rates: tuple[float, float], way: float, straight: float) -> NDArra
     """
     theta = rates[1] * way
     across = rates[0] * way + theta * straight**2 / 3.0
-    return np.diag([across, across, theta])
+    return np.array([[across, 0.0, 0.0], [0.0, across, 0.0], [0.0, 0.0, theta]])
 
 
 def reach(covariance: NDArray[np.float64], sigmas: float) -> float:
     """So many sigmas of the position's worst direction [m]."""
-    return sigmas * math.sqrt(float(np.linalg.eigvalsh(covariance[:2, :2])[1]))
+    (xx, xy, _), (_, yy, _), _ = covariance.tolist()
+    return sigmas * math.sqrt(0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy))

@@ -60,7 +60,7 @@ class Expected:
     def _surprise(self, predicted: Pose, pose: Pose) -> float:
         d = predicted.distance(pose) / self.width
         a = angle_difference(pose.theta, predicted.theta) / self.turn
-        return math.log1p(d * d) + 0.5 * math.log1p(a * a)
+        return math.log1p(d * d + a * a)
 
     def explains(self, pose: Pose) -> bool:
         """Whether a pose is as near to a prediction as steady driving is."""

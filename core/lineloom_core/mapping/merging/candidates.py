@@ -56,6 +56,7 @@ def _worth_trying(site: SiteMap, place: Place) -> list[Place]:
         for keyframe in place.keyframes
         for edge in site.graph.edges_at(keyframe)
     )
+    here, most_sigmas = site.pose(place.anchor), site.config.wide_loops.most_sigmas
     chosen = []
     for other in site.places.values():
         if other.id == place.id:
@@ -66,9 +67,10 @@ def _worth_trying(site: SiteMap, place: Place) -> list[Place]:
         near = site.same_track(other.anchor, place.anchor) and not _lies_apart(site, other, place)
         if tied or near:
             continue
-        distance = site.pose(other.anchor).distance(site.pose(place.anchor))
-        drift = site.rough_drift(other.anchor, place.anchor)
-        if distance < 4.0 + reach(drift, site.config.wide_loops.most_sigmas):
+        beyond = site.pose(other.anchor).distance(here) - 4.0
+        if beyond < 0.0 or beyond < reach(
+            site.rough_drift(other.anchor, place.anchor), most_sigmas
+        ):
             chosen.append(other)
     return chosen
 
