@@ -2,6 +2,9 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
+# Tests start hundreds of processes: each would compile the sources that have no bytecode.
+test test-long: export PYTHONDONTWRITEBYTECODE =
+
 .PHONY: install demo test test-long lint bench wheels clean
 
 install: .venv/installed

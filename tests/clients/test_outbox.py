@@ -71,7 +71,7 @@ def test_put_numbers_and_flush_delivers_in_order(
     outbox = make(path, client, quick)
     assert [outbox.put(scan(None)) for _ in range(25)] == list(range(25))
     assert outbox.stats().pending == 25
-    stats = outbox.flush(timeout=5.0)
+    stats = outbox.flush(timeout=60.0)
     assert (stats.put, stats.delivered, stats.pending) == (25, 25, 0)
     assert fake.batch_sizes == [10, 10, 5]
     assert fake.delivered() == [(outbox.session, n) for n in range(25)]
@@ -166,7 +166,7 @@ def test_network_loss_is_waited_out(
         outbox.put(scan(seq))
     fake.failures = [httpx.ConnectError("no route to host")] * 12
     fake.lost = 2
-    stats = outbox.flush(timeout=10.0)
+    stats = outbox.flush(timeout=60.0)
     assert (stats.delivered, stats.pending) == (15, 0)
     assert fake.delivered() == [(outbox.session, n) for n in range(15)]
     assert outbox.failure is None
@@ -184,7 +184,7 @@ def test_a_flush_in_vain_says_why_and_keeps_everything(
     assert outbox.failure.in_a_row > 1
     fake.failures = [problem(401, "no-token", "send a token")]
     with pytest.raises(AccessDeniedError):
-        outbox.flush(timeout=5.0)
+        outbox.flush(timeout=60.0)
     assert outbox.stats().pending == 1
 
 
@@ -238,7 +238,7 @@ def test_the_background_delivers_by_itself(
     with make(path, client, quick) as outbox:
         for seq in range(30):
             outbox.put(scan(seq))
-        deadline = time.monotonic() + 10.0
+        deadline = time.monotonic() + 60.0
         while outbox.stats().pending and time.monotonic() < deadline:
             time.sleep(0.01)
         assert outbox.stats().delivered == 30
@@ -297,7 +297,7 @@ def kill_while_putting(path: Path, url: str, after: float) -> list[tuple[str, in
     time.sleep(after)
     child.send_signal(signal.SIGKILL)
     rest = child.stdout.read()
-    child.wait(timeout=10.0)
+    child.wait(timeout=60.0)
     lines = [line.split() for line in (first + rest).splitlines(keepends=True) if "\n" in line]
     return [(session, int(seq)) for session, seq in lines]
 
@@ -310,7 +310,7 @@ def test_kill_9_of_the_robot_loses_and_doubles_nothing(
         known += kill_while_putting(path, loopback, after)
     assert len({session for session, _ in known}) == 3
     with Client(loopback, retry=ONCE) as client:
-        stats = make(path, client, quick, batch=200).flush(timeout=20.0)
+        stats = make(path, client, quick, batch=200).flush(timeout=60.0)
     delivered = fake.delivered()
     assert set(known) <= set(delivered)
     assert len(delivered) == len(set(delivered))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import sys
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -18,12 +18,20 @@ from lineloom_service.service import Service
 from lineloom_service.settings import Settings
 
 from tests.service.databases import KINDS, fresh_database
+from tests.service.zygote import forked_workers
 
 # Worker processes inherit the path and import `fake_mapper` by its plain name.
 sys.path.insert(0, str(Path(__file__).parents[1] / "service"))
 
 BACKLOG_LIMIT = 500
 _NUMBERS = count()
+
+
+@pytest.fixture(autouse=True, scope="module")
+def quick_workers() -> Iterator[None]:
+    """Fork the workers that load no kernels."""
+    with forked_workers():
+        yield
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module", params=KINDS)
@@ -85,7 +93,7 @@ def idle(client: httpx.AsyncClient) -> Callable[[str], Awaitable[dict[str, Any]]
     """Return a waiter for a site that has nothing left to do."""
 
     async def wait(site: str) -> dict[str, Any]:
-        for _ in range(1000):
+        for _ in range(6000):
             answer: dict[str, Any] = (await client.get(f"/v1/sites/{site}")).json()
             if answer["idle"]:
                 return answer

@@ -50,7 +50,7 @@ class _Slow:
 
 
 async def _until_taken(service: Service, size: int) -> None:
-    async with asyncio.timeout(30.0):
+    async with asyncio.timeout(60.0):
         while service.bodies.taken != size:
             await asyncio.sleep(0.001)
 

@@ -22,7 +22,7 @@ Idle = Callable[[str], Awaitable[dict[str, Any]]]
 
 async def _remade(client: httpx.AsyncClient, site: str) -> dict[str, Any]:
     """Wait until there is nothing more to be made, and return the difference."""
-    for _ in range(1000):
+    for _ in range(6000):
         told: dict[str, Any] = (await client.get(f"{site}/config/difference")).json()
         if (await client.get(site)).json()["remaking"] is None and "version" in told:
             return told
@@ -72,7 +72,7 @@ async def test_a_put_makes_the_map_anew(
     told = await _remade(client, site)
     assert (told["type"], told["version"]) == ("remade", before["version"] + 1)
     assert told["robots"][0]["moved_m"] == 2.0  # as the fake mapper shows this parameter
-    for _ in range(1000):  # events are told when they are on disk
+    for _ in range(6000):  # events are told when they are on disk
         stream = await client.get(f"{site}/events?follow=false", headers={"Last-Event-ID": place})
         if "event: remade" in stream.text:
             break

@@ -84,7 +84,7 @@ async def test_the_state_is_shown(
     assert _get(figures, "robots", site=site, state="tracking") == 2
     assert _get(figures, "constraints", site=site, kind="rendezvous", state="accepted") == 1
     assert _get(figures, "start_time_seconds") > 1e9
-    for _ in range(500):
+    for _ in range(3000):
         ready = (await client.get("/readyz?maps=true")).status_code == 200
         if _get(await _figures(client), "ready") == float(ready) == 1.0:
             break

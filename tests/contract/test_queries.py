@@ -285,7 +285,7 @@ async def test_what_is_not_there(client: httpx.AsyncClient, path: str, slug: str
 async def test_alive_and_ready(client: httpx.AsyncClient) -> None:
     health = (await client.get("/healthz")).json()
     assert health["status"] == "ok"
-    for _ in range(1000):
+    for _ in range(3000):
         response = await client.get("/readyz?maps=true")
         if response.status_code == 200:
             break

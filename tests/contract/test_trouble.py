@@ -20,7 +20,7 @@ SITE = "/v1/sites/troubled"
 
 
 async def _until(client: httpx.AsyncClient, done: Callable[[dict[str, Any]], bool]) -> Any:
-    for _ in range(1000):
+    for _ in range(3000):
         site = (await client.get(SITE)).json()
         if done(site):
             return site

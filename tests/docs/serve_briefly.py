@@ -33,7 +33,7 @@ def main() -> int:
 
 
 def _wait_up(process: subprocess.Popen[bytes], address: str) -> None:
-    deadline = time.monotonic() + 30.0
+    deadline = time.monotonic() + 90.0
     with httpx.Client(trust_env=False, verify=False) as http:
         while time.monotonic() < deadline:
             if process.poll() is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 
 import pytest
@@ -13,6 +13,14 @@ import pytest_asyncio
 sys.path.insert(0, str(Path(__file__).parent))
 
 from tests.service.databases import KINDS, fresh_database
+from tests.service.zygote import forked_workers
+
+
+@pytest.fixture(autouse=True, scope="module")
+def quick_workers() -> Iterator[None]:
+    """Fork the workers that load no kernels."""
+    with forked_workers():
+        yield
 
 
 @pytest_asyncio.fixture(params=KINDS)

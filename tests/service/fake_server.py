@@ -50,7 +50,7 @@ def server_process(
 def _wait_up(port: int, process: subprocess.Popen[bytes]) -> None:
     # One client for all: making one reads every certificate that the system trusts.
     with httpx.Client(trust_env=False, verify=False) as client:
-        for _ in range(600):
+        for _ in range(1200):
             assert process.poll() is None, "the server ended"
             try:
                 if client.get(f"http://127.0.0.1:{port}/healthz").status_code == 200:

@@ -86,7 +86,7 @@ class System:
         return self.conductor.published(record.id)
 
     async def until(self, done: Callable[[Published], bool]) -> Published:
-        for _ in range(2000):
+        for _ in range(6000):
             published = await self.published()
             if done(published):
                 return published

@@ -27,7 +27,7 @@ def _site(port: int) -> dict[str, Any]:
 
 
 def _idle(port: int) -> dict[str, Any]:
-    for _ in range(600):
+    for _ in range(1200):
         site = _site(port)
         if site["idle"]:
             return site
@@ -74,7 +74,7 @@ def _children(pid: int) -> list[int]:
 
 
 def _wait_gone(processes: list[int]) -> None:
-    for _ in range(500):
+    for _ in range(3000):
         if not any(_alive(process) for process in processes):
             return
         time.sleep(0.02)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import signal
 import sys
@@ -15,12 +16,13 @@ import pytest
 from lineloom_core.geometry import Pose
 from lineloom_core.scan import Mount, Scan
 from lineloom_service.engine.local_engine import LocalEngine
+from lineloom_service.engine.protocol import WorkerDiedError
 from lineloom_service.store.actions import delete_site, forget_robot, set_mount
 from lineloom_service.store.codec import decode_scan, encode_mount, encode_scan
 from lineloom_service.store.records import SnapshotRecord
 from lineloom_service.store.snapshots import read_snapshot, save_snapshot
 
-from tests.service.system import PRODUCER, System, fingerprint, running
+from tests.service.system import FAKE, PRODUCER, System, fingerprint, running
 
 RAISES, CRASHES, RAISES_ONCE, HANGS = 666.0, 667.0, 668.0, 669.0
 DATABASE_URL: str | None = None
@@ -100,6 +102,41 @@ async def test_queries_never_go_back_in_time_while_a_replay_runs(
             await asyncio.sleep(0.01)
         assert seen == sorted(seen)
         assert seen[0] == 100
+
+
+async def test_a_worker_that_dies_idle_is_replaced_and_the_site_answers_and_goes_on(
+    tmp_path: Path, undisturbed: tuple[int, tuple[str, ...]]
+) -> None:
+    async with _running(tmp_path) as system:
+        await system.post(range(120))
+        await system.caught_up()
+        os.kill(system.engine.pids[0], signal.SIGKILL)
+        while not system.engine.not_ready():
+            await asyncio.sleep(0.001)
+        answer = None
+        while answer is None:
+            await asyncio.sleep(0.02)
+            with contextlib.suppress(WorkerDiedError):
+                answer = await system.conductor.ask(1, "localise", [])
+        await system.post(range(120, 200))
+        assert fingerprint((await system.caught_up()).view) == undisturbed
+
+
+async def test_what_takes_a_dead_workers_place_does_not_know_its_sites(tmp_path: Path) -> None:
+    engine = LocalEngine(1, mapper=FAKE, warm_up=None)
+    await engine.start()
+    lost: asyncio.Queue[int] = asyncio.Queue()
+    engine.subscribe_deaths(lost.put_nowait)
+    await engine.start_site(1, 0, None)
+    os.kill(engine.pids[0], signal.SIGKILL)
+    assert await lost.get() == 1
+    while engine.not_ready():
+        await asyncio.sleep(0.01)
+    with pytest.raises(WorkerDiedError):
+        await engine.feed(1, [], 0, caught_up=True)
+    await engine.start_site(1, 0, None)
+    await engine.feed(1, [], 0, caught_up=True)
+    await engine.stop()
 
 
 async def test_a_restart_goes_on_from_the_snapshot(
@@ -198,7 +235,7 @@ async def test_an_idle_site_is_saved(tmp_path: Path) -> None:
     async with _running(tmp_path, snapshot_idle_s=0.1) as system:
         await system.post(range(5))
         await system.caught_up()
-        for _ in range(200):
+        for _ in range(3000):
             if await system.store.read(read_snapshot, 1, PRODUCER):
                 break
             await asyncio.sleep(0.02)
@@ -219,9 +256,9 @@ async def test_a_deleted_site_stops_being_mapped(tmp_path: Path) -> None:
 
 
 async def test_workers_that_cannot_start_are_named_as_the_reason(tmp_path: Path) -> None:
-    engine = LocalEngine(1, mapper="no_such_module:Mapper")
+    engine = LocalEngine(1, mapper="no_such_module:Mapper", warm_up=None)
     await engine.start()
-    for _ in range(500):
+    for _ in range(3000):
         reasons = engine.not_ready()
         if reasons and "code 1" in reasons[0]:
             break

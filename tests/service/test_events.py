@@ -64,7 +64,7 @@ class Listener:
             self.heard.extend(self._client.events(self._site))
 
     def until(self, done: Callable[[list[AnyEvent]], bool]) -> list[AnyEvent]:
-        for _ in range(1500):
+        for _ in range(3000):
             if done(heard := list(self.heard)):
                 return heard
             time.sleep(0.02)

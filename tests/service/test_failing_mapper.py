@@ -97,7 +97,7 @@ async def test_a_map_that_cannot_be_saved_is_told_and_costs_no_scan(
     async with _mapping(tmp_path) as (store, conductor):
         await _post(store, 0, UNSAVED)
         await _until(lambda: conductor.trouble(SITE) == said)
-        assert conductor.published(SITE).position == 1
+        await _until(lambda: conductor.published(SITE).position == 1)
         await _post(store, 1, 1.0)
         await _until(lambda: conductor.trouble(SITE) is None)
         assert await _saved(store) == 2

@@ -127,7 +127,7 @@ async def test_a_broken_page_stops_its_site_with_a_clear_word_and_no_other(
     conductor = Conductor(store, engine, settings)
     await conductor.start()
     records = {record.name: record for record in await store.sites()}
-    for _ in range(1500):
+    for _ in range(3000):
         well = conductor.published(records["well"].id)
         if well.position == 40 and conductor.trouble(records["broken"].id):
             break

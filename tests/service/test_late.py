@@ -52,7 +52,7 @@ async def _logged(
         for scans in posts:
             answer = await store.write(append_scans, "s", "r", scans, processed=0, limit=10**6)
             accepted += answer.accepted
-        for _ in range(500):
+        for _ in range(6000):
             record = await store.site("s")
             assert record is not None
             if not record.held:

@@ -83,7 +83,7 @@ async def test_what_was_asked_for_is_rendered_beforehand_as_long_as_it_is() -> N
     assert store.rendered == []
     assert wire.MapAnswer.model_validate_json(await store.json(site, first)).version == 1
     store.prepare(1, second)
-    async with asyncio.timeout(30.0):
+    async with asyncio.timeout(60.0):
         while len(store.rendered) < 2:
             await asyncio.sleep(0.001)
     store.prepare(1, third)  # nobody has asked for the second

@@ -103,7 +103,7 @@ async def test_a_bomb_for_a_question_is_answered_with_what_is_wrong(
         for key, question in asked.items():
             await system.store.write_apart(post_question, key, question)
             forwarding.on_question(key)
-            async with asyncio.timeout(30.0):
+            async with asyncio.timeout(60.0):
                 while (answer := await system.store.write_apart(take_answer, key)) is None:
                     await asyncio.sleep(0.01)
             outcome, reason = decode(answer, tuple[str, bytes])
@@ -121,7 +121,7 @@ async def test_a_bomb_for_an_answer_is_no_answer(
         answers = [bomb(fuse), encode(("answered", bomb(fuse))), encode(("answered", encode(7)))]
         for forged in (*answers, encode(("else", b""))):
             asking = asyncio.create_task(forwarding.ask(1, "what_if", "p1-2"))
-            async with asyncio.timeout(30.0):
+            async with asyncio.timeout(60.0):
                 while not (keys := list(forwarding._waiting)):
                     await asyncio.sleep(0.01)
                 (key,) = keys

@@ -216,7 +216,7 @@ async def test_a_site_that_is_deleted_meanwhile_is_gone(
         assert site is not None
         await system.conductor.forget_site(site)
         assert system.conductor.remaking(site) is None
-        for _ in range(2000):
+        for _ in range(6000):
             if not system.engine._sites:
                 break
             await asyncio.sleep(0.01)

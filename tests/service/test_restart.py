@@ -102,7 +102,7 @@ def _recorded(directory: Path) -> int:
 
 
 def _until(done: Callable[[], bool]) -> None:
-    for _ in range(500):
+    for _ in range(3000):
         if done():
             return
         time.sleep(0.02)
@@ -112,7 +112,7 @@ def _until(done: Callable[[], bool]) -> None:
 def _reasons_until_ready(port: int) -> set[str]:
     reasons: set[str] = set()
     with httpx.Client(trust_env=False, verify=False) as client:
-        for _ in range(3000):
+        for _ in range(12_000):
             answer = client.get(f"http://127.0.0.1:{port}/readyz?maps=true")
             if answer.status_code == 200:
                 return reasons

@@ -133,7 +133,7 @@ def test_who_goes_away_is_no_failure_of_ours(port: int) -> None:
     before = _refused(port, "malformed-body")
     with _connect(port) as wire:
         wire.sendall(_head(b"goes", len(BODY)) + BODY[:-5])
-    for _ in range(600):
+    for _ in range(1200):
         if _refused(port, "malformed-body") > before:
             break
         time.sleep(0.05)

@@ -196,7 +196,7 @@ async def test_a_deleted_site_leaves_nothing_and_its_id_never_comes_back(store: 
     assert await store.write(delete_site, "site") == old
     assert await store.site("site") is None
     assert await store.write(delete_site, "site") is None
-    for _ in range(200):
+    for _ in range(3000):
         await asyncio.sleep(0.02)
         if not await store.read(read_feed, old, 0, 1):
             break
@@ -207,7 +207,7 @@ async def test_a_deleted_site_leaves_nothing_and_its_id_never_comes_back(store: 
         query = sa.select(sa.func.count()).select_from(tables.sites)
         return connection.execute(query).scalar_one()
 
-    for _ in range(200):
+    for _ in range(3000):
         if (count := await store.read(count_sites)) == 1:
             break
         await asyncio.sleep(0.02)
@@ -338,7 +338,7 @@ async def test_files_go_with_their_site(store: SqlStore) -> None:
     site = (await _record(store)).id
     await store.write(put_file, site, "export", _file("a", b"one", 1.0))
     await store.write(delete_site, "site")
-    for _ in range(200):
+    for _ in range(6000):
         if not await store.read(list_files, site, "export"):
             break
         await asyncio.sleep(0.01)

@@ -58,7 +58,7 @@ def test_the_page_finds_a_service_that_was_away(
     expect_components(page, "c0", "c1")  # what was there stays
     fake.site.join()
     fake.start()
-    expect(status).to_contain_text("Live", timeout=15_000)
+    expect(status).to_contain_text("Live", timeout=30_000)
     expect_components(page, "c0")
     console.expect("ERR_CONNECTION_REFUSED")
     console.expect("ERR_INCOMPLETE_CHUNKED_ENCODING")

@@ -21,7 +21,7 @@ def wait_drawn(page: Page) -> None:
     page.wait_for_function("() => !lineloom.view._transition && !lineloom.view._picture._job")
 
 
-def expect_components(page: Page, *names: str, timeout: float = 10_000) -> None:
+def expect_components(page: Page, *names: str, timeout: float = 30_000) -> None:
     """Wait until just these components are listed."""
     expect(page.locator(COMPONENTS)).to_have_text(list(names), timeout=timeout)
 

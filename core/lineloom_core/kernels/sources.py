@@ -23,6 +23,7 @@ def kernel_files(package: str) -> list[Path]:
     return [file for file in files if _DEFINES_KERNELS.search(file.read_text(encoding="utf-8"))]
 
 
+@cache
 def digest_of(module: str) -> str:
     """Return a hash of a module's file and of all that it imports of its own distribution.
 

@@ -75,6 +75,7 @@ class Conductor:
         self._store.subscribe_news(self._on_news)
         self._engine.subscribe(self._on_view)
         self._engine.subscribe_failures(self._on_view_failed)
+        self._engine.subscribe_deaths(self._on_death)
         if self._store.shared:
             for record in await self._store.sites():
                 self._views.fetch(record.id)
@@ -268,3 +269,8 @@ class Conductor:
         site = self._sites.get(site_of(host))
         if site is not None:
             site.on_view_failed(host, position, reason)
+
+    def _on_death(self, host: int) -> None:
+        site = self._sites.get(site_of(host))
+        if site is not None:
+            site.on_death(host)

@@ -156,6 +156,12 @@ class HostedSite:
             if runner.host == host:
                 runner.on_view_failed(position, reason)
 
+    def on_death(self, host: int) -> None:
+        """Have it mapped again, even where there is nothing to map: there may be questions."""
+        for runner in self._tasks:
+            if runner.host == host:
+                runner.on_death()
+
     async def end(self) -> list[SiteRunner]:
         """Feed no longer; return those that may still `finish`."""
         self._opening.cancel()

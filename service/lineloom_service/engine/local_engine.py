@@ -35,6 +35,7 @@ from lineloom_service.engine.messages import (
     ViewFailed,
 )
 from lineloom_service.engine.protocol import (
+    DeathListener,
     FailureListener,
     MapperFailedError,
     QuestionFailedError,
@@ -70,10 +71,12 @@ class _Slot:
 class _Site:
     """A hosted site: the number of its start and the answers awaited, in order.
 
-    gathering: the chapters that it is to go on from are on their way, and nothing else is taken.
+    process: the one that it was started on. gathering: the chapters that it is to go on from are
+    on their way, and nothing else is taken.
     """
 
     slot: _Slot
+    process: WorkerProcess | None = None
     run: int = 0
     gathering: bool = False
     awaited: deque[asyncio.Future[Any]] = field(default_factory=deque)
@@ -109,6 +112,7 @@ class LocalEngine:
         self._sites: dict[int, _Site] = {}
         self._listeners: list[ViewListener] = []
         self._failure_listeners: list[FailureListener] = []
+        self._death_listeners: list[DeathListener] = []
         self._durations = Durations()
         self._stopping = False
 
@@ -154,6 +158,10 @@ class LocalEngine:
         """Have `listener` told of views that could not be made."""
         self._failure_listeners.append(listener)
 
+    def subscribe_deaths(self, listener: DeathListener) -> None:
+        """Have `listener` told of sites whose mapper died."""
+        self._death_listeners.append(listener)
+
     def not_ready(self) -> list[str]:
         """Return which workers are not warm yet."""
         return self._compilation.reasons() or [
@@ -184,6 +192,7 @@ class LocalEngine:
         await hosted.slot.ready.wait()
         hosted.fail(WorkerDiedError(None, "the site was started again", killed=False))
         hosted.run += 1
+        hosted.process = hosted.slot.process
         hosted.gathering = chapters is not None
         if chapters is not None:
             await self._gather(site, hosted, chapters)
@@ -192,7 +201,7 @@ class LocalEngine:
 
     async def _gather(self, site: int, hosted: _Site, chapters: AsyncIterator[bytes]) -> None:
         """Send chapters to the process that is there now, each when it has the one before."""
-        run, process = hosted.run, hosted.slot.process
+        run, process = hosted.run, hosted.process
 
         def check() -> None:
             """While a chapter was read nobody waited for an answer that could have told this."""
@@ -254,7 +263,8 @@ class LocalEngine:
         # Who asked may have stopped waiting: then the exception is nobody's business.
         answer.add_done_callback(lambda done: done.cancelled() or done.exception())
         process = hosted.slot.process
-        if process is None or not process.ready:
+        # One that took a dead one's place knows nothing of the site until that is started there.
+        if process is None or not process.ready or process is not hosted.process:
             answer.set_exception(WorkerDiedError(None, hosted.slot.last_words, killed=False))
         else:
             hosted.awaited.append(answer)
@@ -331,6 +341,8 @@ class LocalEngine:
             elif blamed is None and site.gathering:
                 position = RESTORING  # most likely it had no room for the chapters
             site.fail(WorkerDiedError(position, slot.last_words, killed=process.killed))
+            for told in self._death_listeners:
+                told(number)
         pause = min(_RESPAWN_LIMIT_S, _RESPAWN_S * 2**slot.stillborn) if slot.stillborn else 0.0
         asyncio.get_running_loop().call_later(pause, self._spawn, slot)
 

@@ -17,6 +17,8 @@ ViewListener = Callable[[int, int, SiteView], None]
 
 
 FailureListener = Callable[[int, int, str], None]
+DeathListener = Callable[[int], None]
+"""Called with a site whose mapper is gone and has to be started again."""
 """Called on the event loop with a site, its position and why there is no view after the entry."""
 
 
@@ -88,6 +90,10 @@ class Engine(Protocol):
 
     def subscribe_failures(self, listener: FailureListener) -> None:
         """Have `listener` told of views that the mapper could not make."""
+        ...
+
+    def subscribe_deaths(self, listener: DeathListener) -> None:
+        """Have `listener` told of sites whose mapper died, also of those that had nothing to do."""
         ...
 
     def not_ready(self) -> list[str]:

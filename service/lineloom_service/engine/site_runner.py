@@ -100,6 +100,7 @@ class SiteRunner:
         self._recorder = recorder
         self._recorded = 0
         self._wake = asyncio.Event()
+        self._died = False
         self._strikes: Counter[int] = Counter()
         self._troubles: dict[str, str] = {}
         self._save_at = 0.0
@@ -141,6 +142,11 @@ class SiteRunner:
     def on_view_failed(self, position: int, reason: str) -> None:
         """The last view stands."""
         self._troubles["view"] = f"its map after entry {position} cannot be shown: {reason}"
+
+    def on_death(self) -> None:
+        """The mapper is gone; where it had nothing to do, nobody else would tell."""
+        self._died = True
+        self._wake.set()
 
     async def run(self) -> None:
         """Keep the site hosted and fed, whatever happens to its worker."""
@@ -211,6 +217,8 @@ class SiteRunner:
         await self._resume()
         self._troubles.pop("start", None)
         while True:
+            if self._died:
+                raise WorkerDiedError(None, "its mapper died", killed=False)
             self._wake.clear()
             while self._sent < self._end and len(self._under_way) < _FEEDS_UNDER_WAY:
                 await self._send()
@@ -225,6 +233,7 @@ class SiteRunner:
 
     async def _resume(self) -> None:
         """Start from the latest snapshot, or from nothing."""
+        self._died = False
         snapshot = await self._store.read(read_snapshot, self.site, self.making.id)
         self._saved = 0 if snapshot is None else snapshot.position
         self._chapters = 0 if snapshot is None else snapshot.end

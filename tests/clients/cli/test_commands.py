@@ -147,7 +147,7 @@ def test_no_service_is_told_with_what_to_do_next(log: Path) -> None:
     for arguments in (["status"], ["map"], ["replay", log]):
         begin = time.monotonic()
         assert "lineloom serve" in one_line(run(*arguments, "--url", url), 3)
-        assert time.monotonic() - begin < 5.0
+        assert time.monotonic() - begin < 20.0
 
 
 def test_status_shows_sites_and_robots(loopback: str, fake: FakeService) -> None:

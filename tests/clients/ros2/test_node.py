@@ -30,7 +30,7 @@ def transform(x: float, yaw: float) -> Any:
 
 
 def until(condition: Any) -> None:
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + 60.0
     while not condition():
         assert time.monotonic() < deadline, "nothing came"
         time.sleep(0.01)
