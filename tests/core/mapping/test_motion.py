@@ -181,6 +181,14 @@ def test_surprise_grows_and_its_tails_are_heavy() -> None:
     assert not expected.explains(Pose(0.0, 0.0, 0.21))
 
 
+def test_who_has_not_driven_has_shown_no_pace() -> None:
+    still, due = steadily([Pose.identity()] * 30)
+    assert still.expect(due).steady
+    assert not still.expect(due).paced
+    driving, due = steadily([Pose(0.1, 0.0, 0.0)] * 30)
+    assert driving.expect(due).paced
+
+
 def test_a_step_is_like_another_in_way_and_turn_together() -> None:
     turn, drive = Pose(0.0, 0.0, -0.7), Pose(2.0, 0.0, 0.1)
     expected = Expected((turn, drive), 0.6, 0.5, 1.0, False)

@@ -28,6 +28,7 @@ _LONG = 16.0  # usual intervals that no pause is longer than while there were bu
 _MEAN_OF = 6  # poses that it is the mean over
 _MOST_STRETCH = 2.0  # times the last step: where scans arrive in bursts, stamps lie
 _SMOOTHING_S = 0.3
+_PACED = 1.0  # m: who has not driven as far may only just have started
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +37,8 @@ class Expected:
 
     predictions: of the laser in the track's frame. width [m], turn [rad]: how far off they may be.
     gap: time since the last scan over the usual interval; 1 where the clock does not tell. steady:
-    steps have been so small and even that following them needs no search.
+    steps have been so small and even that following them needs no search. paced: it has driven far
+    enough to have shown how large its steps are.
     """
 
     predictions: tuple[Pose, ...]
@@ -44,6 +46,7 @@ class Expected:
     turn: float
     gap: float
     steady: bool
+    paced: bool = False
 
     def with_wheels(self, rolled: Pose) -> Expected:
         """The same with what the wheels say, last."""
@@ -80,6 +83,7 @@ class Expected:
     _way=deque[Pose],
     _kinds=deque[Pose],
     _steps=int,
+    _driven=float,
     _turn_rate=float,
 )
 class Motion:
@@ -94,6 +98,7 @@ class Motion:
         self._way: deque[Pose] = deque(maxlen=_MEAN_OF)
         self._kinds: deque[Pose] = deque(maxlen=_KINDS)
         self._steps = 0
+        self._driven = 0.0
         self._turn_rate = 0.0
 
     @property
@@ -126,7 +131,7 @@ class Motion:
         small = self._usual[0] < _STEADY[0] and self._usual[1] < _STEADY[1]
         predictions = [last @ _scaled(self._step, stretch)]
         if small and self._steps > 1:
-            return Expected(tuple(predictions), width, turn, gap, True)
+            return Expected(tuple(predictions), width, turn, gap, True, self._driven > _PACED)
         # Who turns on the spot and drives on in turns does what it did before, not just now.
         for step in reversed(self._kinds):
             if all(not _is_alike(last @ step, p) for p in predictions):
@@ -168,6 +173,7 @@ class Motion:
         self._way.append(pose)
         self._stamp = stamp
         self._steps += 1
+        self._driven += math.hypot(step.x, step.y)
 
     def _turn(self, turn: float, elapsed: float) -> None:
         if 0.01 < elapsed < 1.0:

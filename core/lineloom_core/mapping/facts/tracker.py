@@ -201,7 +201,7 @@ class Tracker:
             "backed": float(searched.backing == "match"),
             "wall": searched.best.matched * features.wall,
         }
-        if expected.steady:  # who drives evenly and then is elsewhere was carried
+        if expected.paced:  # who drives evenly and then is elsewhere was carried
             figures["surprise"] = expected.surprise(searched.best.pose)
         return _Found(self._by_what_stood_still(cloud, searched.best.found), searched.axis, figures)
 
