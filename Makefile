@@ -4,6 +4,8 @@ BIN := .venv/bin
 
 # Tests start hundreds of processes: each would compile the sources that have no bytecode.
 test test-long: export PYTHONDONTWRITEBYTECODE =
+# One process for each core: threads of their own for small matrices would only take turns.
+test test-long: export OPENBLAS_NUM_THREADS = 1
 
 .PHONY: install demo test test-long lint bench wheels clean
 

@@ -114,50 +114,21 @@ def make_former_file(
 ) -> None:
     """Make the file: the scans of site `s`, then actions (kind, robot, constraint)."""
     robots = {name: i for i, name in enumerate(dict.fromkeys(s.robot for s in scans), 1)}
-    counts = {name: sum(s.robot == name for s in scans) for name in robots}
-    entries: list[dict[str, Any]] = [
-        {
-            "robot_id": robots[s.robot],
-            "kind": "scan",
-            "stream_id": robots[s.robot],
-            "seq": s.scan.seq,
-            "body": encode_scan(s.scan),
-        }
-        for s in scans
-    ]
-    entries += [
-        {
-            "robot_id": robots[robot],
-            "kind": kind,
-            "stream_id": None,
-            "seq": None,
-            "body": constraint.encode(),
-        }
-        for kind, robot, constraint in actions
-    ]
+    entries = _entries(robots, scans, actions)
     end = len(entries)
+    snapshot = {
+        **{"site_id": 1, "position": end, "scans": len(scans), "producer": "0.1.0"},
+        **{"data": saved, "chapters": 0},
+    }
     rows: dict[str, list[dict[str, Any]]] = {
         "sites": [{"id": 1, "name": "s", "position": end, "deleted": False, "revision": end}],
         "robots": [
             {"id": i, "site_id": 1, "name": name, "mount": None, "forgotten": False}
             for name, i in robots.items()
         ],
-        "streams": [
-            {
-                **{"id": i, "robot_id": i, "session": "0", "accepted": counts[name]},
-                **{"released": counts[name] - 1, "highest": counts[name] - 1},
-            }
-            for name, i in robots.items()
-        ],
-        "entries": [
-            {"id": i, "site_id": 1, "position": i, **entry} for i, entry in enumerate(entries, 1)
-        ],
-        "snapshots": [
-            {
-                **{"site_id": 1, "position": end, "scans": len(scans), "producer": "0.1.0"},
-                **{"data": saved, "chapters": 0},
-            }
-        ][: saved is not None],
+        "streams": [_stream(i, sum(s.robot == name for s in scans)) for name, i in robots.items()],
+        "entries": entries,
+        "snapshots": [] if saved is None else [snapshot],
     }
     engine = sqlite_engine(path)
     with engine.begin() as connection:
@@ -167,3 +138,30 @@ def make_former_file(
                 table = sa.Table(name, sa.MetaData(), autoload_with=connection)
                 connection.execute(sa.insert(table), of_table)
     engine.dispose()
+
+
+def _entries(
+    robots: Mapping[str, int],
+    scans: Sequence[SimulatedScan],
+    actions: Sequence[tuple[str, str, str]],
+) -> list[dict[str, Any]]:
+    """Rows of the log."""
+    told: list[tuple[str, str, int | None, int | None, bytes]] = [
+        ("scan", s.robot, robots[s.robot], s.scan.seq, encode_scan(s.scan)) for s in scans
+    ]
+    told += [(kind, robot, None, None, name.encode()) for kind, robot, name in actions]
+    return [
+        {
+            **{"id": i, "site_id": 1, "position": i, "robot_id": robots[robot], "kind": kind},
+            **{"stream_id": stream, "seq": seq, "body": body},
+        }
+        for i, (kind, robot, stream, seq, body) in enumerate(told, 1)
+    ]
+
+
+def _stream(number: int, count: int) -> dict[str, Any]:
+    """The row of a robot's one session, all of it there."""
+    return {
+        **{"id": number, "robot_id": number, "session": "0", "accepted": count},
+        **{"released": count - 1, "highest": count - 1},
+    }

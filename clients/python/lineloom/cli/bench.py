@@ -13,7 +13,7 @@ from lineloom.cli.bench_ladders import ladders
 from lineloom.cli.bench_logs import logs
 from lineloom.cli.bench_merges import merges
 from lineloom.cli.console import note, out, print_json
-from lineloom.cli.failure import CommandError, Exit
+from lineloom.cli.failure import CommandError, Exit, needing_core
 from lineloom.cli.one_thread import use_one_thread
 
 if TYPE_CHECKING:
@@ -98,13 +98,9 @@ def pairs(
       lineloom bench pairs --matchers lineloom --worst out/worst
     """
     use_one_thread()
-    try:
+    with needing_core("benchmarks"):
         from lineloom_lab.evaluation.pair_bench import run_pair_bench
         from lineloom_lab.evaluation.pair_bench_report import to_json, to_markdown
-    except ImportError:
-        raise CommandError(
-            "benchmarks need the core: `pip install lineloom-client[server]`"
-        ) from None
     contestants = _contestants(matchers)
     sets = _sets(data, simulated, limit)
     album = _Album(worst)

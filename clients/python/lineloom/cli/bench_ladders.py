@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from lineloom.cli.bench_runs import Jobs, JsonFile, Pictures, deliver, run
-from lineloom.cli.failure import CommandError, Exit
+from lineloom.cli.failure import CommandError, Exit, needing_core
 from lineloom.cli.one_thread import use_one_thread
 
 Quick = Annotated[
@@ -46,15 +46,11 @@ def ladders(
       lineloom bench ladders --only beams --seeds 6 --json out/beams.json
     """
     use_one_thread()
-    try:
+    with needing_core("benchmarks"):
         from lineloom_lab.evaluation.log_bench import LogCase
         from lineloom_lab.evaluation.log_bench_cases import Setting
         from lineloom_lab.evaluation.log_bench_ladder_report import ladders_json, ladders_markdown
         from lineloom_lab.evaluation.log_bench_ladders import SimulatedLog, ladder_rungs
-    except ImportError:
-        raise CommandError(
-            "benchmarks need the core: `pip install lineloom-client[server]`"
-        ) from None
     rungs = ladder_rungs()
     chosen = [rung for rung in rungs if only is None or only in rung.ladder]
     if not chosen:

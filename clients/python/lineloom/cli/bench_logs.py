@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from lineloom.cli.bench_runs import Jobs, JsonFile, Pictures, deliver, run
-from lineloom.cli.failure import CommandError, Exit
+from lineloom.cli.failure import CommandError, Exit, needing_core
 from lineloom.cli.one_thread import use_one_thread
 
 if TYPE_CHECKING:
@@ -77,14 +77,10 @@ def logs(
       lineloom bench logs --logs freiburg-101 --clocks true,x20 --strides 1,2
     """
     use_one_thread()
-    try:
+    with needing_core("benchmarks"):
         from lineloom_lab.evaluation.log_bench import LogCase
         from lineloom_lab.evaluation.log_bench_cases import with_odometry
         from lineloom_lab.evaluation.log_bench_report import to_json, to_markdown
-    except ImportError:
-        raise CommandError(
-            "benchmarks need the core: `pip install lineloom-client[server]`"
-        ) from None
     settings = _settings(quick, parts, strides, clocks)
     if odometry:
         settings = with_odometry(settings)

@@ -9,7 +9,7 @@ import typer
 
 from lineloom.cli import options
 from lineloom.cli.console import note, out, print_json
-from lineloom.cli.failure import CommandError, Exit
+from lineloom.cli.failure import CommandError, Exit, needing_core
 from lineloom.cli.one_thread import use_one_thread
 
 SHARED_PLANS = Path(__file__).resolve().parents[5] / "shared" / "data" / "floorplans"
@@ -67,14 +67,10 @@ def merges(
       lineloom bench merges --jobs 2 --pictures out/merges --json
     """
     use_one_thread()
-    try:
+    with needing_core("benchmarks"):
         from lineloom_lab.evaluation.merge_bench import run_merge_bench
         from lineloom_lab.evaluation.merge_bench_cases import full_cases, quick_cases
         from lineloom_lab.evaluation.merge_bench_report import to_json, to_markdown
-    except ImportError:
-        raise CommandError(
-            "benchmarks need the core: `pip install lineloom-client[server]`"
-        ) from None
     plans = _plans(floor_plans)
     cases = quick_cases(seed, plans) if quick else full_cases(seed, rounds, plans)
     chosen = [case for case in cases if only is None or only in case.building]

@@ -10,7 +10,7 @@ import typer
 
 from lineloom.cli import options
 from lineloom.cli.console import note, out, print_json
-from lineloom.cli.failure import CommandError, Exit
+from lineloom.cli.failure import CommandError, Exit, needing_core
 from lineloom.cli.served_experiment import Service
 
 if TYPE_CHECKING:
@@ -124,12 +124,8 @@ def experiment(
 
 
 def _settings(seed: int, quick: bool, matcher: MatcherChoice, data: Path | None) -> Settings:
-    try:
+    with needing_core("experiments"):
         from lineloom_lab.experiments import Settings
-    except ImportError:
-        raise CommandError(
-            "experiments need the core: `pip install lineloom-client[server]`"
-        ) from None
     return Settings(seed=seed, quick=quick, matcher=matcher.value, data=data or SHARED_DATA)
 
 

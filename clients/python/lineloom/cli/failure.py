@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import IntEnum
 
 from lineloom.errors import (
@@ -57,6 +59,18 @@ class CommandError(Exception):
     def __init__(self, message: str, code: Exit = Exit.FAILED) -> None:
         super().__init__(message)
         self.code = code
+
+
+@contextmanager
+def needing_core(what: str) -> Iterator[None]:
+    """Say what to install where an import finds no core. what: needs it, in the plural.
+
+    Raises CommandError.
+    """
+    try:
+        yield
+    except ImportError:
+        raise CommandError(f"{what} need the core: `pip install lineloom-client[server]`") from None
 
 
 def explained(error: Exception) -> CommandError | None:
