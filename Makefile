@@ -21,7 +21,7 @@ install: .venv/installed
 demo: install
 	$(BIN)/lineloom demo
 
-# A file's tests stay together, in one process of as many as there are cores.
+# A file's tests stay together, in one process of one more than there are cores.
 test: install
 	$(BIN)/python -m pytest --numprocesses=auto --dist=loadfile --no-loadscope-reorder
 
