@@ -121,7 +121,7 @@ def _run(directory: Path, mapper: str, seed: int, lives: int, scan: Scans) -> in
     with server(directory / "disturbed", port, **environment) as process:
         maps = asyncio.run(_maps(port))
         process.send_signal(signal.SIGTERM)
-        process.wait(30)
+        process.wait(60)
     logs = asyncio.run(_log(directory / "disturbed"))
     for stream, count in acknowledged.items():
         seqs = [entry.seq for entry in logs[stream[0]] if entry.robot == stream[1]]
