@@ -71,7 +71,8 @@ def to_site(
     return wire.Site(
         site=record.name,
         version=view.version,
-        idle=counts.pending == 0 and published.position >= record.position,
+        settled=view.settled,
+        idle=counts.pending == 0 and published.rank >= (record.position, True),
         scans=counts,
         robots=sorted(record.robots),
         components=[
@@ -99,6 +100,7 @@ def to_robot(site: str, record: RobotRecord, view: SiteView, skips: Iterable[Ski
         robot=record.name,
         site=site,
         component=None if seen is None else seen.component,
+        settled=view.settled,
         pose=None if seen is None else to_uncertain_pose(seen),
         state="starting" if seen is None else seen.state,
         scans=_counts(record.accepted, processed, skipped_scans),
@@ -138,7 +140,9 @@ def to_trajectory(robot: str, view: SiteView) -> wire.Trajectory:
                     theta=theta,
                 )
             )
-    return wire.Trajectory.model_construct(robot=robot, version=view.version, poses=poses)
+    return wire.Trajectory.model_construct(
+        robot=robot, version=view.version, settled=view.settled, poses=poses
+    )
 
 
 def to_line(line: MapLine) -> wire.Line:
@@ -194,7 +198,9 @@ def to_graph(site: str, view: SiteView) -> wire.Graph:
         wire.Submap(id=s.id, robot=s.robot, anchor=s.anchor, keyframes=list(s.keyframes))
         for s in view.places
     ]
-    summary = wire.GraphSummary(site=site, version=view.version, submaps=submaps)
+    summary = wire.GraphSummary(
+        site=site, version=view.version, settled=view.settled, submaps=submaps
+    )
     return wire.Graph(graph=summary, nodes=nodes, edges=edges)
 
 
@@ -228,6 +234,7 @@ def to_transform(robot_a: str, robot_b: str, view: SiteView, found: RelativePose
         robot_b=robot_b,
         component=found.component,
         version=view.version,
+        settled=view.settled,
         T_a_b=_pose(found.T_a_b),
         covariance=None if found.covariance is None else matrix(found.covariance),
         constraints=list(found.constraints),

@@ -41,7 +41,7 @@ class _Known:
     """A placement, and of what: the plan, and how much there was of the map."""
 
     sha256: str
-    extent: tuple[int, int]
+    extent: tuple[int, int, bool]
     registration: Registration
 
 
@@ -126,10 +126,14 @@ def lines_of(view: SiteView, component: str) -> NDArray[np.float64]:
     return np.array(rows, dtype=np.float64).reshape(-1, 4)
 
 
-def _extent(view: SiteView, component: str) -> tuple[int, int]:
-    """Return how many keyframes there are, and constraints in all: what moves the map."""
+def _extent(view: SiteView, component: str) -> tuple[int, int, bool]:
+    """Return how many keyframes there are, constraints in all, and whether it is settled.
+
+    That is what moves the map.
+    """
     keyframes = sum(1 for k in view.keyframes if k.component == component)
-    return keyframes, sum(1 for c in view.constraints if c.state == "accepted")
+    accepted = sum(1 for c in view.constraints if c.state == "accepted")
+    return keyframes, accepted, view.settled
 
 
 def _judge(plan: FloorPlan, rays: Rays, lines: NDArray[np.float64]) -> Judge:

@@ -63,11 +63,11 @@ async def render_map(
     )
 
 
-def ray_source(service: Service, site: SiteRecord) -> RaySource:
-    """Return who to ask for the rays of a site's components."""
+def ray_source(service: Service, site: SiteRecord, view: SiteView) -> RaySource:
+    """Return who to ask for the rays of a site's components: settled ones where the view is."""
 
     async def rays(component: str) -> Rays:
-        found: Rays = await ask(service, site, "rays", component)
+        found: Rays = await ask(service, site, "rays", component, view.settled)
         return found
 
     return rays
@@ -106,7 +106,7 @@ async def _nav2(
         detail = f"component: a nav2 map is of one component, name it; there is: {there}"
         raise ProblemError(INVALID_PARAMETER, detail)
     T = shown.frames.get(chosen, Pose.identity())
-    rays = (await ray_source(service, site)(chosen)).moved(T)
+    rays = (await ray_source(service, site, shown.view)(chosen)).moved(T)
     lines = lines_of(shown.view, chosen)
     try:
         grid = await asyncio.to_thread(

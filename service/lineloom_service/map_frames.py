@@ -39,7 +39,7 @@ async def versioned(
 
     The ETag names what it is a function of; in the plan's frame, the plan is part of that.
     """
-    etag = f"{site.id}-{view.version}-{__version__}"
+    etag = f"{site.id}-{view.version}{'-settled' if view.settled else ''}-{__version__}"
     if frame == "plan":
         plan = await service.floorplans.plan(site)
         etag += "-none" if plan is None else f"-{plan.sha256[:16]}"
@@ -80,7 +80,7 @@ async def _in_plan(
         raise ProblemError(NO_FLOOR_PLAN, f"site {site.name!r} has no floor plan; PUT one")
     wanted = [c.id for c in view.components if component in (None, c.id)]
     placed = await service.floorplans.placements(
-        ray_source(service, site), site, view, plan, wanted
+        ray_source(service, site, view), site, view, plan, wanted
     )
     frames: dict[str, Pose] = {
         name: p.T_plan_map for name, p in placed.items() if p.T_plan_map is not None

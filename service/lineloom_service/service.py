@@ -49,6 +49,7 @@ class Service:
         self.engine: Engine = engine or LocalEngine(
             settings.workers,
             publish_every_s=settings.publish_every_s,
+            settle_after_s=settings.settle_after_s,
             patience_s=settings.entry_timeout_s,
         )
         self.events = EventHub()

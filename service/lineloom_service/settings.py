@@ -94,6 +94,11 @@ class Settings(BaseSettings):
     publish_every_s: float = Field(
         default=0.5, ge=0.0, description="How often a busy worker publishes its map at most."
     )
+    settle_after_s: float = Field(
+        default=1.0,
+        ge=0.0,
+        description="A site that nothing has come to for this long is shown at its optimum.",
+    )
     snapshot_every: int = Field(
         default=1_000, ge=1, description="Log entries between two snapshots of a busy site."
     )

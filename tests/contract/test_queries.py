@@ -223,7 +223,7 @@ async def test_graph(client: httpx.AsyncClient) -> None:
     graph = nx.node_link_graph(answer, edges="edges")
     assert (graph.number_of_nodes(), graph.number_of_edges()) == (3, 1)
     assert graph.nodes["0"]["robot"] == "a"
-    assert graph.graph == {"site": "office", "version": 9, "submaps": []}
+    assert graph.graph == {"site": "office", "version": 9, "settled": True, "submaps": []}
     assert list(graph.edges(keys=True)) == [("0", "2", "k0-2")]
     g2o = await _get(client, "/graph", format="g2o")
     assert g2o.text.count("VERTEX_SE2") == 3
@@ -304,7 +304,9 @@ async def test_only_what_changed_since_a_version(
     await idle("delta")
     first = (await client.get(url)).json()
     assert not {"since", "full", "removed"} & set(first)
-    same = (await client.get(url, params={"since": first["version"]})).json()
+    here = {"since": first["version"], "since_settled": first["settled"]}
+    assert first["settled"] is True
+    same = (await client.get(url, params=here)).json()
     assert (same["full"], same["lines"], same["removed"]) == (False, [], [])
     await client.post("/v1/sites/delta/robots/r/scans", json=make_scan(1))
     await idle("delta")

@@ -39,6 +39,7 @@ from lineloom_core.mapping.answers.site_view import (
     SiteView,
 )
 from lineloom_core.mapping.answers.trajectories import Trajectories, Way, Whereabouts
+from lineloom_core.mapping.answers.view_change import EMPTY_VIEW, ViewChange
 from lineloom_core.mapping.belief.claim import Claim
 from lineloom_core.mapping.belief.constraint_state import StateChange
 from lineloom_core.mapping.changes import Changes
@@ -127,7 +128,7 @@ class FakeMapper:
         self._link("restore", repr(constraint))
         self._retracted.pop(_name(constraint), None)
 
-    def rays(self, component: str) -> Rays:
+    def rays(self, component: str, settled: bool) -> Rays:
         """A lidar at the origin that sees five walls a metre to five metres ahead."""
         sweep = (-1.0, 0.5)
         ranges = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
@@ -167,7 +168,10 @@ class FakeMapper:
         best = PoseHypothesis("c1", Pose(x, 0.5, 0.1), np.diag([0.01, 0.01, math.inf]), 0.9, checks)
         return Localisation("unique", "it fits", seen[-1], (best,))
 
-    def view(self) -> SiteView:
+    def settled(self) -> ViewChange:
+        return ViewChange.between(EMPTY_VIEW, self.view(settled=True))
+
+    def view(self, *, settled: bool = False) -> SiteView:
         if self._latest == UNSEEN:
             raise ValueError("there is nothing to see")
         keyframes = tuple(self._keyframes())
@@ -185,6 +189,7 @@ class FakeMapper:
             lines=tuple(self._lines(components)),
             keyframes=keyframes,
             constraints=tuple(self._constraints(keyframes)),
+            settled=settled,
         )
 
     def snapshot(self, known: int = 0) -> Snapshot:

@@ -17,8 +17,8 @@ from lineloom_core.mapping.answers.site_view import (
     RobotView,
     SiteView,
 )
+from lineloom_core.mapping.answers.view_change import EMPTY_VIEW
 from lineloom_core.mapping.facts.scan_name import ScanName
-from lineloom_service.engine.published import EMPTY_VIEW
 from lineloom_service.events.difference import MOST_LINES_LISTED, events_between
 
 
@@ -49,6 +49,7 @@ def _keyframes(**component_of: str) -> tuple[KeyframeView, ...]:
 
 APART = replace(
     EMPTY_VIEW,
+    settled=False,
     version=7,
     robots={"a": _robot("a", 3), "b": _robot("b", 4, "c2")},
     components=(ComponentView("c1", ("a",), 1), ComponentView("c2", ("b",), 1)),
@@ -82,6 +83,18 @@ def test_nothing_happened() -> None:
         assert events_between(view, replace(view, version=view.version + 1), 0.0) == []
 
 
+def test_that_a_map_has_settled_is_told_once_even_where_nothing_moved() -> None:
+    rests = replace(APART, settled=True)
+    (told,) = _by_type(APART, rests)["map"]
+    assert told == {
+        "type": "map", "changed": [], "removed": [], "complete": True, "settled": True
+    }  # fmt: skip
+    assert _by_type(rests, rests) == _by_type(rests, APART) == {}
+    moved = replace(rests, lines=(_line("l1", 0.002), *APART.lines[1:]))
+    assert set(_by_type(APART, moved)) == {"map"}
+    assert _by_type(APART, moved)["map"][0]["changed"] == ["l1"]
+
+
 def test_a_merge_tells_its_cause_first() -> None:
     assert list(_by_type(APART, JOINED)) == [
         *("scan", "constraint", "component-merged", "map", "robot")
@@ -100,7 +113,8 @@ def test_a_merge_tells_its_cause_first() -> None:
     assert (constraint["robot_a"], constraint["robot_b"]) == ("a", "b")
     (scan,) = found["scan"]
     assert (scan["robot"], scan["added"], scan["processed"]) == ("b", 2, 6)
-    assert found["map"] == [{"type": "map", "changed": ["l2"], "removed": [], "complete": True}]
+    told = {"changed": ["l2"], "removed": [], "complete": True, "settled": False}
+    assert found["map"] == [{"type": "map", **told}]
     (robot,) = found["robot"]
     assert (robot["robot"], robot["component"]) == ("b", "c1")
 
@@ -161,7 +175,8 @@ def test_a_robot_that_started_anew_counts_from_nothing() -> None:
 def test_more_lines_than_can_be_listed() -> None:
     many = replace(APART, lines=tuple(_line(f"m{i}") for i in range(MOST_LINES_LISTED + 1)))
     (event,) = _by_type(APART, many)["map"]
-    assert event == {"type": "map", "changed": [], "removed": [], "complete": False}
+    told = {"changed": [], "removed": [], "complete": False, "settled": False}
+    assert event == {"type": "map", **told}
 
 
 def test_the_difference_of_lines_is_all_of_it() -> None:

@@ -12,8 +12,8 @@ import pytest
 from lineloom import wire
 from lineloom_core.io.selection import BBox, select
 from lineloom_core.mapping.answers.site_view import ComponentView, MapLine, SiteView
+from lineloom_core.mapping.answers.view_change import EMPTY_VIEW
 from lineloom_service.convert import to_line
-from lineloom_service.engine.published import EMPTY_VIEW
 from lineloom_service.maps.line_history import LineHistory
 from lineloom_service.maps.map_json import write_line, write_map
 from lineloom_service.maps.map_store import MapStore
@@ -21,6 +21,7 @@ from lineloom_service.maps.render_cache import RenderCache
 from lineloom_service.store.records import SiteRecord
 
 COMPONENTS = (ComponentView("c1", ("a", "b"), 4), ComponentView("c2", (), 1))
+START = replace(EMPTY_VIEW, settled=False)
 BOX = (0.0, -1.0, 3.0, 1.0)
 
 
@@ -36,7 +37,7 @@ def _views(seed: int, count: int) -> list[SiteView]:
         for number in rng.integers(0, 25, size=3):
             lines.pop(f"l{number}", None)
         kept = tuple(lines.values())
-        views.append(replace(EMPTY_VIEW, version=version, components=COMPONENTS, lines=kept))
+        views.append(replace(START, version=version, components=COMPONENTS, lines=kept))
     return views
 
 
@@ -45,6 +46,7 @@ def _twin(view: SiteView, component: str | None, box: BBox | None) -> dict[str, 
     return wire.MapAnswer(
         site="s",
         version=view.version,
+        settled=view.settled,
         components=[
             wire.MapComponent(id=c.component.id, robots=list(c.component.robots)) for c in chosen
         ],
@@ -66,7 +68,7 @@ class _Counted(MapStore):
 
         async def counted(key: Any, render: Any) -> bytes:
             def render_once() -> str | bytes:
-                self.rendered.append(key[1])
+                self.rendered.append(key[1][0])
                 return render()  # type: ignore[no-any-return]
 
             return await get(key, render_once)
@@ -118,6 +120,20 @@ def test_differences_add_up_from_any_version_to_any_other(component: str | None,
         held[view.version] = whole
         same = _answer(history, view, component, box, view.version)
         assert (same.lines, same.removed) == ([], [])
+
+
+def test_what_moved_as_a_version_settled_is_told_to_those_who_have_it_from_before() -> None:
+    history = LineHistory(write_line)
+    (view,) = _views(4, 2)
+    moved = replace(view.lines[0], x1=view.lines[0].x1 + 0.002)
+    rests = replace(view, settled=True, lines=(moved, *view.lines[2:]))
+    before = _answer(history, view, None, None)
+    told = _answer(history, rests, None, None, view.version)
+    assert (before.settled, told.settled, told.full) == (False, True, False)
+    assert [line.id for line in told.lines] == [moved.id]
+    assert told.removed == [view.lines[1].id]
+    again = _answer(history, rests, None, None, view.version, True)
+    assert (again.full, again.lines, again.removed) == (False, [], [])
 
 
 @pytest.mark.parametrize("since", [0, 2, 7, 10**15])

@@ -136,7 +136,8 @@ async def test_what_one_took_the_other_counts_at_once(url: str, tmp_path: Path) 
             await first.post(range(seq, seq + 1))
             site = await second.get("/v1/sites/s")
             assert site["scans"]["accepted"] == seq + 1
-            assert site["idle"] is (site["scans"]["processed"] == seq + 1)
+            mapped = site["scans"]["processed"] == seq + 1
+            assert site["idle"] is (mapped and site["settled"])
 
 
 async def test_a_gap_is_filled_through_another_process(url: str, tmp_path: Path) -> None:

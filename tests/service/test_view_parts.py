@@ -13,12 +13,12 @@ from itertools import islice, pairwise
 import pytest
 from lineloom_core.codec import encode
 from lineloom_core.mapping.answers.site_view import SiteView
-from lineloom_core.mapping.answers.view_change import ViewChange
+from lineloom_core.mapping.answers.view_change import EMPTY_VIEW, ViewChange
 from lineloom_core.mapping.site_mapper import SiteMapper
 from lineloom_lab.simulation import Fleet
 from lineloom_service.engine import view_parts, view_record
 from lineloom_service.engine.local_engine import LocalEngine
-from lineloom_service.engine.published import EMPTY_VIEW, Published
+from lineloom_service.engine.published import Published
 from lineloom_service.engine.view_parts import ViewDecoder, ViewEncoder, read_change, write_change
 from lineloom_service.engine.view_record import ViewReader, ViewWriter
 from lineloom_service.store.records import Skip, ViewRecord

@@ -17,6 +17,7 @@ class FakeSite:
 
     def __init__(self) -> None:
         self.version = 40
+        self.settled = True
         self.joined = False
         self.trouble: str | None = None
         self.remaking: dict[str, Any] | None = None
@@ -65,6 +66,7 @@ class FakeSite:
         return {
             "site": SITE,
             "version": self.version,
+            "settled": self.settled,
             "idle": True,
             "scans": {"accepted": 40, "processed": 40, "pending": 0, "skipped": 0},
             "robots": ["ada", "bob"],
@@ -74,6 +76,9 @@ class FakeSite:
             "trouble": self.trouble,
             "remaking": self.remaking,
         }
+
+    def _of_view(self) -> dict[str, Any]:
+        return {"site": SITE, "version": self.version, "settled": self.settled}
 
     def told(self) -> dict[str, dict[str, Any]]:
         """What events tell of as it is now: one for each thing that is not as it was."""
@@ -107,7 +112,7 @@ class FakeSite:
         lines = [self._line(i, "c0", "ada", wall) for i, wall in enumerate(ROOM)]
         lines += [self._line(10 + i, "c1", "bob", wall) for i, wall in enumerate(ROOM)]
         components = [{"id": c["id"], "robots": c["robots"]} for c in self._components()]
-        return {"site": SITE, "version": self.version, "components": components, "lines": lines}
+        return {**self._of_view(), "components": components, "lines": lines}
 
     def changes(self, since: int) -> dict[str, Any]:
         """`GET …/map?since=`: the whole map, as from a service that has just begun."""
@@ -136,7 +141,7 @@ class FakeSite:
             {"id": "a", "robot": "ada", "anchor": "k2", "keyframes": [f"k{i}" for i in range(5)]},
             {"id": "b", "robot": "bob", "anchor": "k14", "keyframes": ["k12", "k13", "k14", "k15"]},
         ]
-        summary = {"site": SITE, "version": self.version, "submaps": submaps}
+        summary = {**self._of_view(), "submaps": submaps}
         return {"graph": summary, "nodes": nodes, "edges": edges}
 
     def trajectory(self, robot: str) -> dict[str, Any]:

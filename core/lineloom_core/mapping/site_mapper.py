@@ -25,6 +25,7 @@ from lineloom_core.mapping.answers.localise import localise
 from lineloom_core.mapping.answers.ray_source import component_rays
 from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_core.mapping.answers.view_builder import build_view
+from lineloom_core.mapping.answers.view_change import EMPTY_VIEW, ViewChange
 from lineloom_core.mapping.answers.what_if import what_if
 from lineloom_core.mapping.belief.by_reference import dumps, loads
 from lineloom_core.mapping.belief.checkpoints import Checkpoints
@@ -68,6 +69,8 @@ class SiteMapper:
         self._checkpoints = Checkpoints(self._config, self._history, self._memory)
         self._robots: dict[str, RobotRecord] = {}
         self._version = 0
+        self._rest: tuple[int, SiteMap] | None = None
+        """What was settled last, at which version: all that rests on it is asked for together."""
 
     @property
     def version(self) -> int:
@@ -188,17 +191,27 @@ class SiteMapper:
         """Where one robot's scans were taken, the latest counts; changes nothing."""
         return localise(self._site, scans)
 
-    def rays(self, component: str) -> Rays:
+    def rays(self, component: str, settled: bool = False) -> Rays:
         """Return what the lidars saw as free, for an occupancy grid; changes nothing."""
-        return component_rays(self._site, component)
+        return component_rays(self._shown(settled), component)
 
     def view(self, *, settled: bool = False) -> SiteView:
         """Everything there is to know at this version; changes nothing.
 
         settled: at the optimum of all constraints, which poses otherwise are within millimetres of.
         """
-        site = self._site.settled() if settled else self._site
-        return build_view(site, self._robots, self._version)
+        return build_view(self._shown(settled), self._robots, self._version, settled=settled)
+
+    def settled(self) -> ViewChange:
+        """The settled view, as the change that it is from an empty one."""
+        return ViewChange.between(EMPTY_VIEW, self.view(settled=True))
+
+    def _shown(self, settled: bool) -> SiteMap:
+        if not settled:
+            return self._site
+        if self._rest is None or self._rest[0] != self._version:
+            self._rest = self._version, self._site.settled()
+        return self._rest[1]
 
     def snapshot(self, known: int = 0) -> Snapshot:
         """The whole state, for `resume`, without the first `known` chapters of the history."""

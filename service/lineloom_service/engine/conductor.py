@@ -113,7 +113,7 @@ class Conductor:
         here = NOTHING if site is None else site.published
         elsewhere = self._views.get(site_id) or NOTHING
         # After taking over, what the former one published stands until our own map is as far.
-        return here if here.position >= elsewhere.position else elsewhere
+        return here if here.rank >= elsewhere.rank else elsewhere
 
     async def ask(self, site_id: int, question: str, *arguments: object) -> Any:
         """Ask a site's mapper; it may be in the middle of a chunk of scans.

@@ -97,6 +97,7 @@ class LocalEngine:
         workers: int,
         *,
         publish_every_s: float = 0.5,
+        settle_after_s: float = 0.1,
         patience_s: float = 120.0,
         mapper: str = SITE_MAPPER,
         warm_up: str | None = WARM_UP,
@@ -104,6 +105,7 @@ class LocalEngine:
         self._mapper = mapper
         self._warm_up = warm_up
         self._publish_every_s = publish_every_s
+        self._settle_after_s = settle_after_s
         self._patience_s = patience_s
         self._watching: asyncio.Task[None] | None = None
         self._compilation = Compilation()
@@ -182,6 +184,8 @@ class LocalEngine:
         state: bytes | None,
         chapters: AsyncIterator[bytes] | None = None,
         parameters: Mapping[str, Any] | None = None,
+        *,
+        settled: bool = False,
     ) -> None:
         """Host a site on the worker that has fewest, or on the one that has it already."""
         hosted = self._sites.get(site)
@@ -197,7 +201,8 @@ class LocalEngine:
         if chapters is not None:
             await self._gather(site, hosted, chapters)
             hosted.gathering = False
-        await self._ask(hosted, StartSite(site, hosted.run, position, state, parameters or {}))
+        order = StartSite(site, hosted.run, position, state, parameters or {}, settled)
+        await self._ask(hosted, order)
 
     async def _gather(self, site: int, hosted: _Site, chapters: AsyncIterator[bytes]) -> None:
         """Send chapters to the process that is there now, each when it has the one before."""
@@ -223,11 +228,12 @@ class LocalEngine:
         *,
         caught_up: bool,
         publish: bool = False,
+        settled: bool = False,
     ) -> Awaitable[object]:
         """Send entries to the site's worker."""
         hosted = self._sites[site]
-        order = Feed(site, hosted.run, tuple(entries), through, caught_up, publish)
-        return self._ask(hosted, order)
+        run, taken = hosted.run, tuple(entries)
+        return self._ask(hosted, Feed(site, run, taken, through, caught_up, publish, settled))
 
     async def snapshot(self, site: int, known: int = 0) -> Snapshot:
         """Ask the site's worker for the mapper's state."""
@@ -295,6 +301,7 @@ class LocalEngine:
             self._mapper,
             self._warm_up,
             self._publish_every_s,
+            self._settle_after_s,
             on_report=lambda report: self._on_report(slot, process, report),
             on_death=lambda: self._on_death(slot, process),
         )

@@ -49,8 +49,8 @@ class Mapper(Protocol):
         """Take an entry that changes nothing."""
         ...
 
-    def view(self) -> SiteView:
-        """Return all that is known now."""
+    def view(self, *, settled: bool = False) -> SiteView:
+        """Return all that is known now. settled: at the optimum of all constraints."""
         ...
 
     def snapshot(self, known: int = 0) -> Snapshot:

@@ -34,7 +34,8 @@ class Chapter:
 class StartSite:
     """Host a site. state: of a snapshot that goes on from the chapters that came before.
 
-    parameters: of a mapper that begins with nothing; a snapshot has its own.
+    parameters: of a mapper that begins with nothing; a snapshot has its own. settled: its first
+    view is to be.
     """
 
     site: int
@@ -42,12 +43,16 @@ class StartSite:
     position: int
     state: bytes | None
     parameters: Mapping[str, Any]
+    settled: bool = False
 
 
 @storable("message-feed")
 @dataclass(frozen=True, slots=True)
 class Feed:
-    """Map these entries; afterwards the site is at `through`. publish: show the map right then."""
+    """Map these entries; afterwards the site is at `through`.
+
+    publish: show the map right then. settled: at the optimum.
+    """
 
     site: int
     run: int
@@ -55,6 +60,7 @@ class Feed:
     through: int
     caught_up: bool
     publish: bool = False
+    settled: bool = False
 
 
 @storable("message-take-snapshot")

@@ -111,13 +111,16 @@ class Engine(Protocol):
         state: bytes | None,
         chapters: AsyncIterator[bytes] | None = None,
         parameters: Mapping[str, Any] | None = None,
+        *,
+        settled: bool = False,
     ) -> None:
         """Host a site from a snapshot taken after the entry at `position`, or from nothing.
 
         state: as `snapshot` returned it. chapters: all that it goes on from, in order; one is read
         when the one before has arrived where the site is hosted, and what reading raises passes
-        through. parameters: of a mapper that begins with nothing. Replaces the site's mapper where
-        there is one. Raises ResumeFailedError.
+        through. parameters: of a mapper that begins with nothing. settled: the view that is
+        published first is to be. Replaces the site's mapper where there is one. Raises
+        ResumeFailedError.
         """
         ...
 
@@ -129,12 +132,14 @@ class Engine(Protocol):
         *,
         caught_up: bool,
         publish: bool = False,
+        settled: bool = False,
     ) -> Awaitable[object]:
         """Send entries; what is returned is done when the mapper is through all of them.
 
         through: the position after them, which may be that of an entry left out. caught_up: there
         are no more for now. publish: the view at `through` comes before it is done, whatever the
-        pace. Several feeds may be under way. Raises MapperFailedError.
+        pace. settled: it is to be at the optimum, as what stands for a while becomes anyhow.
+        Several feeds may be under way. Raises MapperFailedError.
         """
         ...
 
@@ -170,6 +175,10 @@ class Recorder(Protocol):
 
         Asked before a site is mapped.
         """
+        ...
+
+    async def recorded_settled(self, site_id: int) -> bool:
+        """Return whether the view there was settled."""
         ...
 
     def on_view(self, site_id: int, position: int, view: SiteView, making: str) -> None:

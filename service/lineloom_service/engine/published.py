@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from lineloom_core.mapping.answers.site_view import SiteView
-from lineloom_core.mapping.answers.trajectories import NO_TRAJECTORIES
+from lineloom_core.mapping.answers.view_change import EMPTY_VIEW
 
 from lineloom_service.store.records import Skip
 
@@ -24,16 +24,11 @@ class Published:
     view: SiteView
     skips: tuple[Skip, ...] = ()
 
+    @property
+    def rank(self) -> tuple[int, bool]:
+        """Of two views of a site that of the higher rank is shown: later, or settled."""
+        return self.position, self.view.settled
 
-EMPTY_VIEW = SiteView(
-    version=0,
-    robots={},
-    components=(),
-    merged_into={},
-    trajectories=NO_TRAJECTORIES,
-    lines=(),
-    keyframes=(),
-    constraints=(),
-)
+
 NOTHING = Published(0, 0, 0, EMPTY_VIEW)
 """What is known of a site before its first view."""

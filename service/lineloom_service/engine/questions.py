@@ -31,7 +31,8 @@ _QUESTIONS = {
     "what_if": _Question(tuple[str], f"{_ANSWERS}.evidence:WhatIf"),
     "explain": _Question(tuple[str], f"{_ANSWERS}.evidence:Evidence"),
     "localise": _Question(tuple[Sequence[Scan]], f"{_ANSWERS}.localisation:Localisation"),
-    "rays": _Question(tuple[str], "lineloom_core.fusion.occupancy:Rays"),
+    "rays": _Question(tuple[str, bool], "lineloom_core.fusion.occupancy:Rays"),
+    "settled": _Question(tuple[()], f"{_ANSWERS}.view_change:ViewChange"),
 }
 """Methods of the mapper that answer and change nothing: what `Engine.ask` may name."""
 

@@ -53,7 +53,7 @@ class SharedViews:
 
     async def load(self, site_id: int) -> Published | None:
         """Return the view that was saved last, by whatever code; None where none can be read."""
-        record = await self._store.read(read_view, site_id, -1)
+        record = await self._store.read(read_view, site_id, 0)
         try:
             return None if record is None else await asyncio.to_thread(ViewReader().read, record)
         except ValueError as error:
@@ -115,11 +115,13 @@ class SharedViews:
             self._wanted.discard(site_id)
             known = self._views.get(site_id)
             try:
-                after = -1 if known is None else known.position
-                record = await self._store.read(read_view, site_id, after)
+                from_on = 0 if known is None else known.position
+                record = await self._store.read(read_view, site_id, from_on)
                 if record is not None:
                     reader = self._readers.setdefault(site_id, ViewReader())
-                    self._views[site_id] = await asyncio.to_thread(reader.read, record)
+                    found = await asyncio.to_thread(reader.read, record)
+                    if known is None or found.rank > known.rank:
+                        self._views[site_id] = found
             except StoreError:
                 self._wanted.add(site_id)
                 await asyncio.sleep(_AGAIN_S)

@@ -98,7 +98,7 @@ class SiteRunner:
         self._engine = engine
         self._pace = pace
         self._recorder = recorder
-        self._recorded = 0
+        self._recorded, self._recorded_settled = 0, False
         self._wake = asyncio.Event()
         self._died = False
         self._strikes: Counter[int] = Counter()
@@ -128,7 +128,7 @@ class SiteRunner:
 
     def on_view(self, position: int, view: SiteView) -> None:
         """Take what the worker published; a replay does not take queries back in time."""
-        if self.published is not None and position < self.published.position:
+        if self.published is not None and (position, view.settled) < self.published.rank:
             return
         scans = self._marks.get(position, self._scans_done)
         left_out = tuple(s for _, s in sorted(self.skips.items()) if s.position <= position)
@@ -214,6 +214,7 @@ class SiteRunner:
     async def _host(self) -> None:
         if self._recorder is not None:
             self._recorded = await self._recorder.recorded_position(self.site)
+            self._recorded_settled = await self._recorder.recorded_settled(self.site)
         await self._resume()
         self._troubles.pop("start", None)
         while True:
@@ -248,7 +249,10 @@ class SiteRunner:
             await self._engine.start_site(self.host, 0, None, parameters=parameters)
         else:
             chapters = read_chapters(self._store, self.site, snapshot)
-            await self._engine.start_site(self.host, self._saved, snapshot.data, chapters)
+            settled = self._recorded_settled and self._saved == self._recorded
+            await self._engine.start_site(
+                self.host, self._saved, snapshot.data, chapters, settled=settled
+            )
 
     async def _send(self) -> None:
         # The next events go on from the view right there, so that view has to be published.
@@ -269,6 +273,7 @@ class SiteRunner:
             self._sent,
             caught_up=self._sent >= self._end,
             publish=self._sent == self._recorded,
+            settled=self._sent == self._recorded and self._recorded_settled,
         )
         self._under_way.append((asyncio.ensure_future(answer), self._sent, self._scans_sent))
 

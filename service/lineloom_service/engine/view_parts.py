@@ -15,9 +15,7 @@ from typing import Any, TypeVar
 
 from lineloom_core.codec import CodecError, decode, encode
 from lineloom_core.mapping.answers.site_view import SiteView
-from lineloom_core.mapping.answers.view_change import TABLES, ViewChange
-
-from lineloom_service.engine.published import EMPTY_VIEW
+from lineloom_core.mapping.answers.view_change import EMPTY_VIEW, TABLES, ViewChange
 
 T = TypeVar("T")
 Parts = tuple[bytes, ...]

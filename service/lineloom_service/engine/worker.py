@@ -63,7 +63,8 @@ _PUBLISHING_SHARE = 0.1
 class _Hosted:
     """A site's mapper. taken: entries of the feed under way that it has.
 
-    due: when to publish, None where the view is up to date.
+    due: when to publish, None where the view is up to date. settled: whether the view is to be, or
+    is, at the optimum. shown: the position of the view that was sent last.
     """
 
     run: int
@@ -71,6 +72,8 @@ class _Hosted:
     position: int
     taken: int = 0
     due: float | None = None
+    settled: bool = False
+    shown: int | None = None
     earliest: float = 0.0
     pause: float = 0.0
     encoder: ViewEncoder = field(default_factory=ViewEncoder)
@@ -96,11 +99,13 @@ class Worker:
         current: CurrentEntry,
         factory: MapperFactory,
         publish_every_s: float,
+        settle_after_s: float,
     ) -> None:
         self._connection = connection
         self._current = current
         self._factory = factory
         self._publish_every_s = publish_every_s
+        self._settle_after_s = settle_after_s
         self._sites: dict[int, _Hosted] = {}
         self._gathered: dict[int, _Gathered] = {}
         self._turns = Turns()
@@ -180,8 +185,9 @@ class Worker:
             return
         finally:
             self._current.clear()
-        now = time.monotonic()
-        self._sites[order.site] = _Hosted(order.run, mapper, order.position, due=now)
+        self._sites[order.site] = _Hosted(
+            order.run, mapper, order.position, due=time.monotonic(), settled=order.settled
+        )
         self._send(Started(order.site, order.run))
 
     def _feed(self, order: Feed) -> bool:
@@ -196,10 +202,12 @@ class Worker:
             return False
         hosted.taken = 0
         hosted.position = order.through
-        pause = _CAUGHT_UP_PAUSE_S if order.caught_up else self._publish_every_s
-        hosted.due = hosted.earliest + max(pause, hosted.pause)
-        if order.publish:
-            self._publish(order.site, hosted)
+        if hosted.position != hosted.shown:
+            pause = _CAUGHT_UP_PAUSE_S if order.caught_up else self._publish_every_s
+            hosted.due = hosted.earliest + max(pause, hosted.pause)
+            hosted.settled = order.settled
+            if order.publish:
+                self._publish(order.site, hosted)
         self._send(Fed(order.site, order.run))
         return True
 
@@ -274,7 +282,7 @@ class Worker:
         hosted.due = None
         self._current.mark(site, BUSY)
         try:
-            parts = hosted.encoder.encode(hosted.mapper.view())
+            parts = hosted.encoder.encode(hosted.mapper.view(settled=hosted.settled))
         except Exception as error:
             # The site stays at its last view, and is not idle: that is the truth.
             _LOG.exception("site %d: no view after entry %d", site, hosted.position)
@@ -284,9 +292,17 @@ class Worker:
             self._durations.observe("view", time.monotonic() - started)
             self._send(Timed(self._durations.take()))
             self._send(EncodedView(site, hosted.run, hosted.position, parts))
+            hosted.shown = hosted.position
         self._current.clear()
         hosted.earliest = time.monotonic()
-        hosted.pause = (hosted.earliest - started) / _PUBLISHING_SHARE
+        took = hosted.earliest - started
+        if hosted.settled:
+            return
+        hosted.pause = took / _PUBLISHING_SHARE
+        if hosted.shown != hosted.position:
+            return
+        # Nothing may come for a while: then what is shown is to be exact. A feed puts this off.
+        hosted.due, hosted.settled = hosted.earliest + max(self._settle_after_s, took), True
 
 
 def describe(error: BaseException) -> str:
@@ -296,7 +312,14 @@ def describe(error: BaseException) -> str:
 
 
 def run_worker(
-    mapper: str, warm_up: str | None, publish_every_s: float, *, pipe: int, life: int, current: int
+    mapper: str,
+    warm_up: str | None,
+    publish_every_s: float,
+    settle_after_s: float,
+    *,
+    pipe: int,
+    life: int,
+    current: int,
 ) -> None:
     """Be a worker process. Ends with the service, however that ends.
 
@@ -317,7 +340,8 @@ def run_worker(
     connection: Connection[Any, Any] = Connection(pipe)
     # The service has closed its end: nobody is left to report to.
     with contextlib.suppress(BrokenPipeError, ConnectionResetError):
-        Worker(connection, CurrentEntry(current), factory, publish_every_s).serve()
+        worker = Worker(connection, CurrentEntry(current), factory, publish_every_s, settle_after_s)
+        worker.serve()
 
 
 def _begin_again() -> None:

@@ -44,6 +44,7 @@ class WorkerProcess:
         mapper: str,
         warm_up: str | None,
         publish_every_s: float,
+        settle_after_s: float,
         on_report: Callable[[Report], None],
         on_death: Callable[[], None],
     ) -> None:
@@ -62,7 +63,7 @@ class WorkerProcess:
         self._connection: Connection[Any, Any] = ours
         life, self._life = os.pipe()
         descriptors = (theirs.fileno(), life, self._current.fd)
-        arguments = (mapper, warm_up or "", publish_every_s, *descriptors)
+        arguments = (mapper, warm_up or "", publish_every_s, settle_after_s, *descriptors)
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-m", "lineloom_service.engine", *map(str, arguments)],
             stdin=subprocess.DEVNULL,

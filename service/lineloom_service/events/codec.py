@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import zlib
 from collections.abc import Sequence
@@ -54,6 +55,11 @@ def pack(told: Sequence[Told]) -> bytes:
     """Return a batch's body for the store: a line an event, its type before its JSON."""
     lines = "\n".join(f"{event.type} {event.data}" for event in told)
     return zlib.compress(lines.encode(), 1)
+
+
+def tells_settled(body: bytes) -> bool:
+    """Return whether a batch is of a settled view: its map event says so."""
+    return any(t.type == "map" and json.loads(t.data).get("settled") for t in unpack(body))
 
 
 def unpack(body: bytes) -> tuple[Told, ...]:

@@ -29,7 +29,7 @@ def events_between(old: SiteView, new: SiteView, at: float) -> list[wire.AnyEven
     found += _constraints(change, old, at)
     found += _merges(change, old, new, at)
     found += _splits(change, old, new, at)
-    found += _map(change, at)
+    found += _map(change, at, rests=new.settled and not old.settled)
     found += _robots(change, old, at)
     return found
 
@@ -167,9 +167,10 @@ def _origin(old: SiteView, new: SiteView, component: ComponentView) -> str | Non
     return next((k.component for k in old.keyframes if k.id in members), None)
 
 
-def _map(change: ViewChange, at: float) -> Iterator[wire.MapEvent]:
+def _map(change: ViewChange, at: float, *, rests: bool) -> Iterator[wire.MapEvent]:
+    """rests: it has settled, which is worth telling even where no line has moved by it."""
     changed, removed = list(change.lines.new), list(change.lines.gone)
-    if not changed and not removed:
+    if not changed and not removed and not rests:
         return
     complete = len(changed) + len(removed) <= MOST_LINES_LISTED
     yield wire.MapEvent(
@@ -178,4 +179,5 @@ def _map(change: ViewChange, at: float) -> Iterator[wire.MapEvent]:
         changed=changed if complete else [],
         removed=removed if complete else [],
         complete=complete,
+        settled=change.settled,
     )

@@ -16,7 +16,7 @@ from lineloom import wire
 from lineloom_core.mapping.answers.site_view import SiteView
 
 from lineloom_service.engine.protocol import Remade
-from lineloom_service.events.codec import encode, pack
+from lineloom_service.events.codec import encode, pack, tells_settled
 from lineloom_service.events.difference import events_between
 from lineloom_service.events.hub import EventHub
 from lineloom_service.events.remade import as_file, remade_event
@@ -54,6 +54,7 @@ class _History:
     position: int
     version: int
     producer: str
+    settled: bool = False
     told: SiteView | None = None
     waiting: _Publication | None = None
     task: asyncio.Task[None] | None = None
@@ -77,6 +78,10 @@ class EventRecorder:
         """Return the log position that a site's events go up to. Asked before it is mapped."""
         return (await self._history(site_id)).position
 
+    async def recorded_settled(self, site_id: int) -> bool:
+        """Return whether the view there was settled: only that one is what was told."""
+        return (await self._history(site_id)).settled
+
     async def _history(self, site_id: int) -> _History:
         history = self._histories.get(site_id)
         if history is None:
@@ -84,7 +89,13 @@ class EventRecorder:
             history = (
                 _History(0, 0, 0, "")
                 if last is None
-                else _History(last.number, last.position, last.version, last.producer)
+                else _History(
+                    last.number,
+                    last.position,
+                    last.version,
+                    last.producer,
+                    tells_settled(last.body),
+                )
             )
             self._histories[site_id] = history
         return history
@@ -92,7 +103,10 @@ class EventRecorder:
     def on_view(self, site_id: int, position: int, view: SiteView, making: str) -> None:
         """Take a published view. Where views come faster than they are told, some are skipped."""
         history = self._histories.get(site_id)
-        if history is None or (history.told is None and position < history.position):
+        if history is None:
+            return
+        recorded = history.position, history.settled
+        if history.told is None and (position, view.settled) < recorded:
             return
         publication = _Publication(position, view, making, time.time())
         if history.told is None:
@@ -173,6 +187,7 @@ class EventRecorder:
             if told:
                 history.number, history.position = batch.number, batch.position
                 history.version, history.producer = batch.version, batch.producer
+                history.settled = publication.view.settled
                 self._hub.add(site_id, batch.number, told)
 
 
@@ -180,7 +195,11 @@ def _why_reset(history: _History, position: int, view: SiteView, making: str) ->
     """Tell why the history cannot go on from this view, None where it can."""
     if history.number and history.producer != making:
         return "another version of the service has made the map anew"
-    if position != history.position or view.version != history.version:
+    if (position, view.version, view.settled) != (
+        history.position,
+        history.version,
+        history.settled,
+    ):
         return "the map was made anew, and not all that happened meanwhile was recorded"
     return None
 

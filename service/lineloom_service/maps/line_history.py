@@ -16,24 +16,24 @@ _VERSIONS = 1_000
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """A line and its JSON. since: the version with which it became so."""
+    """A line and its JSON. since: the stage (`SiteView.stage`) with which it became so."""
 
     line: MapLine
     json: str
-    since: int
+    since: tuple[int, bool]
 
 
 @dataclass(frozen=True, slots=True)
 class LineTable:
-    """A site's lines at one version, in the view's order.
+    """A site's lines at one stage, in the view's order.
 
-    removed: id -> version with which the line went. known: versions that a difference can be told
+    removed: id -> stage with which the line went. known: versions that a difference can be told
     from: those that this history was brought to, one after another.
     """
 
-    version: int
+    stage: tuple[int, bool]
     lines: dict[str, Written]
-    removed: dict[str, int]
+    removed: dict[str, tuple[int, bool]]
     known: frozenset[int]
 
 
@@ -44,29 +44,30 @@ class LineHistory:
         self._write = write
         self._lock = threading.Lock()
         self._versions: deque[int] = deque(maxlen=_VERSIONS)
-        self._table = LineTable(-1, {}, {}, frozenset())
+        self._table = LineTable((-1, False), {}, {}, frozenset())
 
     def at(self, view: SiteView) -> LineTable:
         """Return the table of a view. One older than the history's has no history of its own."""
         with self._lock:
-            if view.version > self._table.version:
+            if view.stage > self._table.stage:
                 self._table = self._advanced(view)
-            if view.version == self._table.version:
+            if view.stage == self._table.stage:
                 return self._table
-        return LineTable(view.version, self._change({}, view).apply({}), {}, frozenset())
+        return LineTable(view.stage, self._change({}, view).apply({}), {}, frozenset())
 
     def _advanced(self, view: SiteView) -> LineTable:
-        self._versions.append(view.version)
+        if view.version != self._table.stage[0]:
+            self._versions.append(view.version)
         change = self._change(self._table.lines, view)
         lines = change.apply(self._table.lines)
-        removed = self._table.removed | dict.fromkeys(change.gone, view.version)
+        removed = self._table.removed | dict.fromkeys(change.gone, view.stage)
         return LineTable(
-            view.version,
+            view.stage,
             lines,
             {
-                id: version
-                for id, version in removed.items()
-                if version > self._versions[0] and id not in lines
+                id: stage
+                for id, stage in removed.items()
+                if stage > (self._versions[0], False) and id not in lines
             },
             frozenset(self._versions),
         )
@@ -74,4 +75,4 @@ class LineHistory:
     def _change(self, before: dict[str, Written], view: SiteView) -> TableChange[str, Written]:
         known = {id: written.line for id, written in before.items()}
         change = TableChange.between(known, {line.id: line for line in view.lines})
-        return change.mapped(lambda line: Written(line, self._write(line), view.version))
+        return change.mapped(lambda line: Written(line, self._write(line), view.stage))

@@ -22,18 +22,20 @@ def write_map(
     component: str | None,
     box: BBox | None,
     since: int | None = None,
+    since_settled: bool = False,
 ) -> bytes:
     """Return the answer: the lines chosen, or what of them changed after version `since`.
 
     Where that version is not one that this process has answered with before (too old, or from
-    before a restart), it is the whole map, and says so by `full`.
+    before a restart), it is the whole map, and says so by `full`. What moved as that version
+    settled is told again unless who asks has it from then: `since_settled`.
     """
     components = [c for c in view.components if component is None or c.id == component]
     known = since is not None and (since in table.known)
     by_component: dict[str, list[str]] = {c.id: [] for c in components}
     left: list[str] = []
     for name, written in table.lines.items():
-        if known and since is not None and written.since <= since:
+        if known and since is not None and written.since <= (since, since_settled):
             continue
         place = by_component.get(written.line.component)
         if place is not None and _touches(written.line, box):
@@ -43,12 +45,17 @@ def write_map(
             left.append(name)
     lines = ",".join(json for c in components for json in by_component[c.id])
     head = wire.MapAnswer.model_construct(
-        site=site, version=view.version, components=[_component(c) for c in components], lines=[]
+        site=site,
+        version=view.version,
+        settled=view.settled,
+        components=[_component(c) for c in components],
+        lines=[],
     ).model_dump_json(exclude_unset=True)
     text = f"{head.removesuffix('[]}')}[{lines}]"
     if since is not None:
         if known:
-            left += [name for name, version in table.removed.items() if version > since]
+            here = since, since_settled
+            left += [name for name, stage in table.removed.items() if stage > here]
         text += (
             "," + wire.MapChanges(since=since, full=not known, removed=left).model_dump_json()[1:-1]
         )

@@ -22,6 +22,7 @@ class MapPart:
     component: str | None = None
     box: BBox | None = None
     since: int | None = None
+    since_settled: bool = False
 
 
 WHOLE_MAP = MapPart()
@@ -57,11 +58,10 @@ class MapStore:
         history = self._histories.setdefault(site.id, LineHistory(write_line))
 
         def render() -> bytes:
-            return write_map(
-                site.name, view, history.at(view), part.component, part.box, part.since
-            )
+            chosen = part.component, part.box, part.since, part.since_settled
+            return write_map(site.name, view, history.at(view), *chosen)
 
-        return await self._cache.get((site.id, view.version, "json", part), render)
+        return await self._cache.get((site.id, view.stage, "json", part), render)
 
     async def other(
         self,
@@ -71,7 +71,7 @@ class MapStore:
         render: Callable[[], str | bytes],
     ) -> bytes:
         """Return what `render` makes of the view; `form` names all that tells it from others."""
-        return await self._cache.get((site.id, view.version, *form), render)
+        return await self._cache.get((site.id, view.stage, *form), render)
 
     def forget_site(self, site_id: int) -> None:
         """A site was deleted."""

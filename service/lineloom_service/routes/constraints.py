@@ -175,6 +175,7 @@ def _page(
     return wire.ConstraintPage(
         site=site,
         version=view.version,
+        settled=view.settled,
         constraints=[to_constraint(constraint) for constraint in page],
         next_cursor=page[-1].id if len(found) > limit else None,
     )

@@ -14,6 +14,7 @@ from lineloom_core.mapping.answers.site_view import SiteView
 from pydantic import ValidationError
 
 from lineloom_service.answers import answer, matches
+from lineloom_service.asking import settled_view
 from lineloom_service.dependencies import CurrentView, KnownSite, ServiceDep
 from lineloom_service.errors import (
     INVALID_PARAMETER,
@@ -47,9 +48,12 @@ async def post_export(
 ) -> Response:
     """Write the map as it is now into a file that stays: kept on disk, at an address of its own.
 
+    It is settled: where the site is busy, its optimum is worked out for this.
+
     The same map again is the same file. `map` holds the parameters of VDA 5050's `downloadMap`.
     """
     wanted = await _read_request(request, service)
+    view = await settled_view(service, site, view)
     if wanted.component is not None and all(c.id != wanted.component for c in view.components):
         known = ", ".join(c.id for c in view.components) or "none"
         detail = f"no component {wanted.component!r}; there is: {known}"
@@ -135,7 +139,7 @@ async def _render(
 def _file(view: SiteView, wanted: wire.ExportRequest, content: bytes) -> FileRecord:
     """Name a file after the map's version and its own content."""
     sha256 = hashlib.sha256(content).hexdigest()
-    about = wanted.model_dump(mode="json") | {"version": view.version}
+    about = wanted.model_dump(mode="json") | {"version": view.version, "settled": view.settled}
     name = f"{wanted.format}-{view.version}-{sha256[:16]}"
     return FileRecord(name, json.dumps(about), sha256, len(content), time.time(), content)
 
@@ -148,6 +152,7 @@ def _export(request: Request, site: SiteRecord, file: FileRecord) -> wire.Export
         id=file.name,
         site=site.name,
         version=about["version"],
+        settled=about.get("settled", False),
         format=about["format"],
         component=component,
         media_type=wire.MAP_FORMATS[about["format"]].media_type,

@@ -106,7 +106,7 @@ async def get_differences(
         raise unknown_format(format, _DIFFERENCES)
     stored = await _plan(service, site)
     chosen, T = await _placed(service, site, view, stored, component)
-    judge = await judge_component(stored.plan, ray_source(service, site), view, chosen)
+    judge = await judge_component(stored.plan, ray_source(service, site, view), view, chosen)
     found = await asyncio.to_thread(differences, judge, T)
     if format == "json":
         return answer(_differences(site, view, chosen, found))
@@ -128,11 +128,12 @@ async def _describe(
 ) -> wire.FloorPlanAnswer:
     components = [c.id for c in view.components]
     placed = await service.floorplans.placements(
-        ray_source(service, site), site, view, stored, components
+        ray_source(service, site, view), site, view, stored, components
     )
     return wire.FloorPlanAnswer(
         site=site.name,
         version=view.version,
+        settled=view.settled,
         sha256=stored.sha256,
         lines=len(stored.plan.lines),
         extent=stored.plan.extent,
@@ -148,7 +149,7 @@ async def _placed(
     if component is not None and not components:
         raise ProblemError(UNKNOWN_COMPONENT, f"no component {component!r}")
     placed = await service.floorplans.placements(
-        ray_source(service, site), site, view, stored, components
+        ray_source(service, site, view), site, view, stored, components
     )
     known = [(name, p.T_plan_map) for name, p in placed.items() if p.T_plan_map is not None]
     if not known:
@@ -191,6 +192,7 @@ def _differences(
     return wire.PlanDifferences(
         site=site.name,
         version=view.version,
+        settled=view.settled,
         component=component,
         missing=missing,
         new=new,

@@ -57,13 +57,17 @@ async def get_map(
         int | None,
         Query(ge=0, le=MAX_COUNTER, description="A `version`: only what has changed after it."),
     ] = None,
+    since_settled: Annotated[
+        bool, Query(description="That version's answer said `settled`.")
+    ] = False,
     if_none_match: IfNoneMatch = None,
 ) -> Response:
     """Return the map in one of the formats that `/v1/map-formats` lists.
 
     With `since` (json only) only what changed after that version: lines that are new or not what
     they were, and ids that are gone; `full` says that the version is not known (any more) and that
-    the answer is the whole map.
+    the answer is the whole map. A version is shown unsettled first: say by `since_settled` what its
+    `settled` was, else what moved as it settled is told again.
     """
     if format not in wire.MAP_FORMATS:
         raise unknown_format(format, wire.MAP_FORMATS)
@@ -78,7 +82,7 @@ async def get_map(
     if matches(if_none_match, headers["ETag"]):
         return Response(status_code=304, headers=headers)
     if plain:
-        content = await service.maps.json(site, view, MapPart(component, box, since))
+        content = await service.maps.json(site, view, MapPart(component, box, since, since_settled))
     else:
         shown = await in_frame(service, site, view, align=align, frame=frame, component=component)
         content = await render_map(service, site, shown, format, component, box, resolution)

@@ -32,7 +32,9 @@ async def list_robots(site: KnownSite, view: CurrentView, service: ServiceDep) -
     """Return the robots of a site."""
     skips = service.conductor.skips(site.id)
     robots = [to_robot(site.name, site.robots[name], view, skips) for name in sorted(site.robots)]
-    return answer(wire.RobotList(site=site.name, version=view.version, robots=robots))
+    return answer(
+        wire.RobotList(site=site.name, version=view.version, settled=view.settled, robots=robots)
+    )
 
 
 @router.get("/v1/sites/{site}/robots/{robot}", response_model=wire.Robot)

@@ -77,9 +77,9 @@ def read_last_events(connection: Connection, site_id: int) -> EventBatch | None:
     return None if row is None else EventBatch(*row)
 
 
-def read_view(connection: Connection, site_id: int, after: int) -> ViewRecord | None:
-    """Return the published view of a site, unless it is not after position `after`."""
+def read_view(connection: Connection, site_id: int, at_least: int) -> ViewRecord | None:
+    """Return the published view of a site, unless it is before position `at_least`."""
     c = tables.views.c
-    query = select(c.position, c.data).where(c.site_id == site_id, c.position > after)
+    query = select(c.position, c.data).where(c.site_id == site_id, c.position >= at_least)
     row = connection.execute(query).first()
     return None if row is None else ViewRecord(*row)

@@ -40,5 +40,14 @@ class Answer(BaseModel):
     model_config = ConfigDict(extra="ignore", frozen=True)
 
 
+Settled = Annotated[
+    bool,
+    Field(
+        description="Poses are the optimum of all constraints, as in every export and while the "
+        "site is idle; otherwise they are within millimetres of it."
+    ),
+]
+"""A version is shown unsettled first, and settled where nothing comes after it for a while."""
+
 Seq = Annotated[int, Field(ge=0, le=MAX_COUNTER)]
 """A scan's number within its session."""

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from lineloom.wire.base import Answer, Covariance
+from lineloom.wire.base import Answer, Covariance, Settled
 from lineloom.wire.pose import PoseAnswer
 
 ConstraintKind = Literal["sequential", "loop", "rendezvous"]
@@ -51,5 +51,6 @@ class ConstraintPage(Answer):
 
     site: str
     version: int
+    settled: Settled = False
     constraints: list[Constraint]
     next_cursor: str | None = None

@@ -95,13 +95,15 @@ class MapEvent(BaseEvent):
     """The line map has changed: ids of new or changed lines, and of those that are gone.
 
     complete: false where there are too many to be listed; then both lists are empty and
-    `GET …/map?since=` has the changes.
+    `GET …/map?since=` has the changes. settled: nothing came for a while, so the map is now the
+    optimum of all constraints; told even where no line has moved by it.
     """
 
     type: Literal["map"] = "map"
     changed: list[str]
     removed: list[str]
     complete: bool = True
+    settled: bool = False
 
 
 class ResetEvent(BaseEvent):

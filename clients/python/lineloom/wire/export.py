@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from lineloom.wire.base import Answer, Number, Request
+from lineloom.wire.base import Answer, Number, Request, Settled
 from lineloom.wire.map_format import MapFormat
 
 MapFrame = Literal["map", "plan"]
@@ -47,6 +47,7 @@ class Export(Answer):
     id: str
     site: str
     version: int
+    settled: Settled = False
     format: MapFormat
     component: str | None
     media_type: str

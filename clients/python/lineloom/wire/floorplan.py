@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from lineloom.wire.base import Answer
+from lineloom.wire.base import Answer, Settled
 from lineloom.wire.pose import PoseAnswer
 
 
@@ -34,6 +34,7 @@ class FloorPlanAnswer(Answer):
 
     site: str
     version: int
+    settled: Settled = False
     sha256: str
     lines: int
     extent: float
@@ -57,6 +58,7 @@ class PlanDifferences(Answer):
 
     site: str
     version: int
+    settled: Settled = False
     component: str
     missing: list[PlanPiece]
     new: list[PlanPiece]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from lineloom.wire.base import Answer, Covariance
+from lineloom.wire.base import Answer, Covariance, Settled
 
 
 class Submap(Answer):
@@ -24,6 +24,7 @@ class GraphSummary(Answer):
 
     site: str
     version: int
+    settled: Settled = False
     submaps: list[Submap] = Field(default_factory=list)
 
 

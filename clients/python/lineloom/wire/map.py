@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from lineloom.wire.base import Answer
+from lineloom.wire.base import Answer, Settled
 
 
 class MapComponent(Answer):
@@ -52,5 +52,6 @@ class MapAnswer(MapChanges):
 
     site: str
     version: int
+    settled: Settled = False
     components: list[MapComponent]
     lines: list[Line]

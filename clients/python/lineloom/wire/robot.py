@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import ConfigDict
 
-from lineloom.wire.base import Answer, Number, Request
+from lineloom.wire.base import Answer, Number, Request, Settled
 from lineloom.wire.pose import UncertainPose
 from lineloom.wire.site import ScanCounts
 
@@ -43,6 +43,7 @@ class Robot(Answer):
     robot: str
     site: str
     component: str | None = None
+    settled: Settled = False
     pose: UncertainPose | None = None
     state: RobotState
     scans: ScanCounts
@@ -59,4 +60,5 @@ class RobotList(Answer):
 
     site: str
     version: int
+    settled: Settled = False
     robots: list[Robot]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lineloom.wire.base import Answer
+from lineloom.wire.base import Answer, Settled
 
 
 class ScanCounts(Answer):
@@ -39,7 +39,7 @@ class Remaking(Answer):
 class Site(Answer):
     """How a site is doing.
 
-    idle: all that was accepted is in the map, loops and merges included.
+    idle: all that was accepted is in the map, loops and merges included, and the map has settled.
     constraints: counts by kind and, within it, by state.
     merged_into: id of an absorbed component -> id of its survivor.
     trouble: why it is not mapped just now, None where all is well.
@@ -48,6 +48,7 @@ class Site(Answer):
 
     site: str
     version: int
+    settled: Settled = False
     idle: bool
     scans: ScanCounts
     robots: list[str]

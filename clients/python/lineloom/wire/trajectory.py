@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lineloom.wire.base import Answer
+from lineloom.wire.base import Answer, Settled
 
 
 class TrajectoryPose(Answer):
@@ -33,4 +33,5 @@ class Trajectory(Answer):
 
     robot: str
     version: int
+    settled: Settled = False
     poses: list[TrajectoryPose]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lineloom.wire.base import Answer, Covariance
+from lineloom.wire.base import Answer, Covariance, Settled
 from lineloom.wire.pose import PoseAnswer
 
 
@@ -17,6 +17,7 @@ class Transform(Answer):
     robot_b: str
     component: str
     version: int
+    settled: Settled = False
     T_a_b: PoseAnswer
     covariance: Covariance | None = None
     constraints: list[str]

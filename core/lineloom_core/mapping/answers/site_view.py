@@ -171,6 +171,7 @@ class SiteView:
     version: number of log entries processed; grows with every one, so it is the same again after
     a replay. merged_into: component id -> id of the survivor, for components that were absorbed.
     trajectories: by robot, of all robots (put together when asked for, see `trajectories`).
+    settled: poses are the optimum of all constraints, and not only within millimetres of it.
     """
 
     version: int
@@ -182,3 +183,9 @@ class SiteView:
     keyframes: tuple[KeyframeView, ...]
     constraints: tuple[ConstraintView, ...]
     places: tuple[PlaceView, ...] = ()
+    settled: bool = False
+
+    @property
+    def stage(self) -> tuple[int, bool]:
+        """What tells it from all others of its site, in the order in which they are shown."""
+        return self.version, self.settled

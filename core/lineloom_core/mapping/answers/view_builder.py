@@ -22,8 +22,10 @@ from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.facts.robot_record import RobotRecord
 
 
-def build_view(site: SiteMap, robots: dict[str, RobotRecord], version: int) -> SiteView:
-    """Compose the view of a version; changes nothing."""
+def build_view(
+    site: SiteMap, robots: dict[str, RobotRecord], version: int, *, settled: bool = False
+) -> SiteView:
+    """Compose the view of a version; changes nothing. settled: whether the site's poses are."""
     component_of = {k: site.component_id(k) for k in site.keyframes}
     drifts = _drifts(site, robots)
     return SiteView(
@@ -36,6 +38,7 @@ def build_view(site: SiteMap, robots: dict[str, RobotRecord], version: int) -> S
         keyframes=_keyframes(site, component_of),
         constraints=_constraints(site),
         places=_places(site),
+        settled=settled,
     )
 
 

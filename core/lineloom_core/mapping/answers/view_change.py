@@ -22,8 +22,26 @@ from lineloom_core.mapping.answers.site_view import (
     SiteView,
 )
 from lineloom_core.mapping.answers.table_change import Same, TableChange
-from lineloom_core.mapping.answers.trajectories import Trajectories, Way, Whereabouts
+from lineloom_core.mapping.answers.trajectories import (
+    NO_TRAJECTORIES,
+    Trajectories,
+    Way,
+    Whereabouts,
+)
 from lineloom_core.mapping.facts.placed_scans import ScanBlock
+
+EMPTY_VIEW = SiteView(
+    version=0,
+    robots={},
+    components=(),
+    merged_into={},
+    trajectories=NO_TRAJECTORIES,
+    lines=(),
+    keyframes=(),
+    constraints=(),
+    settled=True,
+)
+"""What is known before the first scan: every view is a change of it."""
 
 
 @storable("view-change")
@@ -31,7 +49,8 @@ from lineloom_core.mapping.facts.placed_scans import ScanBlock
 class ViewChange:
     """By table, which entries are new or not what they were, and which are gone.
 
-    version: of the view after. ways, scans, whereabouts: what trajectories are put together of.
+    version, settled: of the view after. ways, scans, whereabouts: what trajectories are put
+    together of.
     """
 
     version: int
@@ -45,6 +64,7 @@ class ViewChange:
     ways: TableChange[str, Way]
     scans: TableChange[str, ScanBlock]
     whereabouts: TableChange[str, Whereabouts]
+    settled: bool
 
     def __bool__(self) -> bool:
         return any(self.tables().values())
@@ -55,7 +75,7 @@ class ViewChange:
 
     def with_tables(self, tables: Mapping[str, TableChange[Any, Any]]) -> ViewChange:
         """Return the change with these in place of all its tables'."""
-        return ViewChange(self.version, **tables)
+        return ViewChange(self.version, settled=self.settled, **tables)
 
     @classmethod
     def between(cls, before: SiteView, after: SiteView) -> ViewChange:
@@ -70,7 +90,7 @@ class ViewChange:
             else TableChange.between(_table(before, name), _table(after, name), same)
             for name in TABLES
         }
-        return cls(after.version, **changes)
+        return cls(after.version, settled=after.settled, **changes)
 
     def apply(self, before: SiteView) -> SiteView:
         """Return the view after; what did not change in it are the same objects.
@@ -89,7 +109,7 @@ class ViewChange:
         }
         if len(changed) < len(now):
             changed["trajectories"] = _trajectories(_made_of(before), now)
-        return replace(before, version=self.version, **changed)
+        return replace(before, version=self.version, settled=self.settled, **changed)
 
 
 TABLES: Mapping[str, type] = {

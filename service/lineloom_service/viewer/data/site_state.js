@@ -25,6 +25,7 @@ export class SiteState {
     this.answers = { site, map, robots, graph, constraints };
     this.site = site;
     this.version = map.version;
+    this.settled = map.settled;
     this.receivedAt = Date.now();
     /** Names in the order of their colours: the same as in the service's own pictures. */
     this.robotNames = robotNamesOf(site, robots);

@@ -6,7 +6,7 @@
  * @typedef {Record<string, {title: string, media_type: string, suffix: string}>} MapFormats
  * @typedef {{accepted: number, processed: number, pending: number, skipped: number}} ScanCounts
  * @typedef {{id: string, robots: string[], keyframes: number}} ComponentAnswer
- * @typedef {{site: string, version: number, idle: boolean, scans: ScanCounts, robots: string[],
+ * @typedef {{site: string, version: number, settled: boolean, idle: boolean, scans: ScanCounts, robots: string[],
  *   components: ComponentAnswer[], merged_into: Object<string, string>,
  *   constraints: Object<string, Object<string, number>>, trouble?: string|null,
  *   remaking?: RemakingAnswer|null}} SiteAnswer
@@ -20,7 +20,8 @@
  * @typedef {{id: string, component: string, x1: number, y1: number, x2: number, y2: number,
  *   sigma: number, support: number, robots: string[], first_seen: number,
  *   last_seen: number}} LineAnswer
- * @typedef {{site: string, version: number, components: {id: string, robots: string[]}[],
+ * @typedef {{site: string, version: number, settled: boolean,
+ *   components: {id: string, robots: string[]}[],
  *   lines: LineAnswer[]}} MapAnswer
  *
  * @typedef {{id: string, robot: string, component: string, session: string, seq: number,

@@ -66,10 +66,10 @@ export class Due {
     this._robots = true;
     if (LIGHT.has(type)) return;
     this._map = true;
-    if (type === "map") {
+    if (type === "map" && !data?.settled) {
       graph.soon();
     } else if (type !== "constraint" || !data?.kind) {
-      this.everything();
+      this.everything(); // what has settled moves as a whole
     } else if (data.was === "accepted" && data.kind !== "sequential") {
       this.everything(); // what was believed is not any more: the map may come apart
     } else {

@@ -18,6 +18,7 @@ export class MapCopy {
     this._api = api;
     this._path = path;
     this._version = -1;
+    this._settled = false;
     /** @type {LineSet|null} */
     this._lines = null;
     /** @type {Map<string, LineAnswer>} */
@@ -34,7 +35,8 @@ export class MapCopy {
     if (!this._lines || this._lines.length < LARGE) {
       return { map: await this._api.get(this._path), change: null };
     }
-    const answer = await this._api.open(`${this._path}?since=${this._version}`);
+    const since = `since=${this._version}&since_settled=${this._settled}`;
+    const answer = await this._api.open(`${this._path}?${since}`);
     const map = await answer.json();
     return { map, change: map.full === false ? new TableChange(map.lines, map.removed) : null };
   }
@@ -53,6 +55,7 @@ export class MapCopy {
       this._byId = new Map(map.lines.map((line) => [line.id, line]));
     }
     this._version = map.version;
+    this._settled = map.settled;
     return { map: { ...map, lines: this._lines.answers }, lines: this._lines };
   }
 }

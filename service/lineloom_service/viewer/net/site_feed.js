@@ -34,6 +34,7 @@ export class SiteFeed {
     this._listener = listener;
     this._stopped = false;
     this._version = -1;
+    this._settled = false;
     this._wake = () => {};
     this._failures = 0;
     this._streaming = false;
@@ -93,8 +94,8 @@ export class SiteFeed {
     this._listener.onConnection(this._streaming ? "live" : "polling", "");
     this._listener.onSite(site);
     this._remaking = Boolean(site.remaking);
-    // Without events, only the version tells that something has changed.
-    const changed = site.version !== this._version;
+    // Without events, only this tells that something has changed.
+    const changed = site.version !== this._version || site.settled !== this._settled;
     if (site.version < this._version) this._reader.forget();
     if (changed && !this._streaming) this._due.everything();
     const due = this._due.begin();
@@ -103,6 +104,7 @@ export class SiteFeed {
       const state = await this._reader.state(due);
       if (this._stopped) return;
       this._version = state.version;
+      this._settled = state.settled;
       this._remaking = Boolean(state.site.remaking);
       this._listener.onSite(state.site); // what came up between the two answers
       this._listener.onState(state);
