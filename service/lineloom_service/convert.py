@@ -8,6 +8,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
 
+import networkx as nx
 import numpy as np
 from lineloom import wire
 from lineloom.wire.base import Covariance
@@ -163,45 +164,23 @@ def to_line(line: MapLine) -> wire.Line:
 
 
 def to_graph(site: str, view: SiteView) -> wire.Graph:
-    """Return keyframes and accepted constraints."""
-    nodes = [
-        wire.GraphNode(
-            id=k.id,
-            robot=k.robot,
-            component=k.component,
-            session=k.session,
-            seq=k.seq,
-            stamp=k.stamp,
-            x=k.pose.x,
-            y=k.pose.y,
-            theta=k.pose.theta,
-        )
-        for k in view.keyframes
-    ]
-    edges = [
-        wire.GraphEdge(
-            source=c.keyframe_a,
-            target=c.keyframe_b,
-            key=c.id,
-            kind=c.kind,
-            state=c.state,
-            x=c.T_a_b.x,
-            y=c.T_a_b.y,
-            theta=c.T_a_b.theta,
-            information=matrix(c.information),
-            residual=c.residual,
-        )
-        for c in view.constraints
-        if c.state == "accepted"
-    ]
-    submaps = [
-        wire.Submap(id=s.id, robot=s.robot, anchor=s.anchor, keyframes=list(s.keyframes))
+    """Return keyframes and accepted constraints, as networkx writes them."""
+    graph = nx.MultiDiGraph(site=site, version=view.version, settled=view.settled)
+    graph.graph["submaps"] = [
+        {"id": s.id, "robot": s.robot, "anchor": s.anchor, "keyframes": s.keyframes}
         for s in view.places
     ]
-    summary = wire.GraphSummary(
-        site=site, version=view.version, settled=view.settled, submaps=submaps
-    )
-    return wire.Graph(graph=summary, nodes=nodes, edges=edges)
+    for k in view.keyframes:
+        where = {"robot": k.robot, "component": k.component, "x": k.pose.x, "y": k.pose.y}
+        when = {"session": k.session, "seq": k.seq, "stamp": k.stamp}
+        graph.add_node(k.id, **where, theta=k.pose.theta, **when)
+    for c in view.constraints:
+        if c.state == "accepted":
+            T_a_b = {"x": c.T_a_b.x, "y": c.T_a_b.y, "theta": c.T_a_b.theta}
+            weighed = {"information": matrix(c.information), "residual": c.residual}
+            said = {"kind": c.kind, "state": c.state, **T_a_b, **weighed}
+            graph.add_edge(c.keyframe_a, c.keyframe_b, key=c.id, **said)
+    return wire.Graph.model_validate(nx.node_link_data(graph, edges="edges"))
 
 
 def to_constraint(constraint: ConstraintView) -> wire.Constraint:

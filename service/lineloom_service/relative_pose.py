@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass
+from itertools import pairwise
 
+import networkx as nx
 import numpy as np
 from lineloom_core.geometry import Pose
-from lineloom_core.mapping.answers.site_view import ConstraintView, RobotView, SiteView
+from lineloom_core.mapping.answers.site_view import RobotView, SiteView
 from numpy.typing import NDArray
 
 
@@ -75,28 +76,17 @@ def _covariance(a: RobotView, b: RobotView, T_a_b: Pose) -> NDArray[np.float64] 
 def _ties(view: SiteView, robot_a: str, robot_b: str) -> tuple[str, ...]:
     """Find the path between the latest keyframes that takes the fewest non-sequential edges."""
     latest = {keyframe.robot: keyframe.id for keyframe in view.keyframes}
-    if robot_a not in latest or robot_b not in latest:
-        return ()
-    start, goal = latest[robot_a], latest[robot_b]
-    neighbours: dict[str, list[tuple[str, ConstraintView]]] = {}
+    graph = nx.Graph()
     for constraint in view.constraints:
         if constraint.state == "accepted":
+            tie = None if constraint.kind == "sequential" else constraint.id
             ends = constraint.keyframe_a, constraint.keyframe_b
-            neighbours.setdefault(ends[0], []).append((ends[1], constraint))
-            neighbours.setdefault(ends[1], []).append((ends[0], constraint))
-    # Breadth first with weights 0 (sequential) and 1: lighter steps go to the front.
-    queue: deque[tuple[str, tuple[str, ...]]] = deque([(start, ())])
-    done: set[str] = set()
-    while queue:
-        node, ties = queue.popleft()
-        if node == goal:
-            return ties
-        if node in done:
-            continue
-        done.add(node)
-        for other, constraint in neighbours.get(node, ()):
-            if constraint.kind == "sequential":
-                queue.appendleft((other, ties))
-            else:
-                queue.append((other, (*ties, constraint.id)))
-    return ()
+            # A step is free, and of several constraints between two keyframes the first stands.
+            if tie is None or not graph.has_edge(*ends):
+                graph.add_edge(*ends, tie=tie, weight=int(tie is not None))
+    try:
+        path = nx.bidirectional_dijkstra(graph, latest[robot_a], latest[robot_b])[1]
+    except (KeyError, nx.NodeNotFound, nx.NetworkXNoPath):
+        return ()
+    ties = (graph.edges[step]["tie"] for step in pairwise(path))
+    return tuple(tie for tie in ties if tie is not None)

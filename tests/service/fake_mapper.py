@@ -29,6 +29,7 @@ from lineloom_core.mapping.answers.evidence import (
     RunnerUp,
     WhatIf,
 )
+from lineloom_core.mapping.answers.factor_graph import FactorGraph
 from lineloom_core.mapping.answers.localisation import Localisation, PoseHypothesis
 from lineloom_core.mapping.answers.site_view import (
     ComponentView,
@@ -167,6 +168,22 @@ class FakeMapper:
         checks = {"evidence": 12.0, "margin": math.inf}
         best = PoseHypothesis("c1", Pose(x, 0.5, 0.1), np.diag([0.01, 0.01, math.inf]), 0.9, checks)
         return Localisation("unique", "it fits", seen[-1], (best,))
+
+    def factors(self) -> FactorGraph:
+        frames = tuple(self._keyframes())
+        row = {k.id: i for i, k in enumerate(frames)}
+        tied = [c for c in self._constraints(frames) if c.state == "accepted"]
+        return FactorGraph(
+            self._version,
+            tuple(row),
+            tuple(k.component for k in frames),
+            np.array([k.pose.to_array() for k in frames]).reshape(-1, 3),
+            np.array([(row[c.keyframe_a], row[c.keyframe_b]) for c in tied], np.int64).reshape(
+                -1, 2
+            ),
+            np.array([c.T_a_b.to_array() for c in tied]).reshape(-1, 3),
+            np.array([c.information for c in tied]).reshape(-1, 3, 3),
+        )
 
     def settled(self) -> ViewChange:
         return ViewChange.between(EMPTY_VIEW, self.view(settled=True))

@@ -32,7 +32,8 @@ async def _map(directory: Path) -> dict[str, object]:
     record = await store.site("site")
     assert record is not None
     assert await conductor.reached(record.id, record.position, 300.0)
-    view = conductor.published(record.id).view
+    while not (view := conductor.published(record.id).view).settled:
+        await asyncio.sleep(0.02)
     met = [c.id for c in view.constraints if c.kind == "rendezvous"]
     evidence = await conductor.ask(record.id, "explain", met[0])
     mapped = engine.durations().stages.get("entry", Histogram())

@@ -107,7 +107,7 @@ def _undisturbed(mapper: str, entries: Sequence[LogEntry]) -> SiteView:
     fed: Mapper = load(mapper)()
     for entry in entries:
         apply(fed, entry)
-    return fed.view()
+    return fed.view(settled=True)  # as it is shown when all is idle
 
 
 def _run(directory: Path, mapper: str, seed: int, lives: int, scan: Scans) -> int:

@@ -9,6 +9,7 @@ from lineloom_core.graph.consistency import (
     pairwise_consistent,
 )
 from lineloom_core.graph.edge import Edge, EdgeKind
+from lineloom_core.graph.factors import read_back
 from lineloom_core.graph.observability import (
     Observability,
     observe,
@@ -33,6 +34,7 @@ __all__ = [
     "observe",
     "pairwise_consistent",
     "project_out_weak",
+    "read_back",
     "rigid_join",
     "without_direction",
 ]

@@ -11,6 +11,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import gtsam
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +48,23 @@ def factors_of(
             noise = gtsam.noiseModel.Robust.Create(_KERNEL, noise)
         graph.add(gtsam.BetweenFactorPose2(a, b, gtsam.Pose2(*T_a_b), noise))
     return graph
+
+
+def read_back(
+    graph: gtsam.NonlinearFactorGraph,
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return ends (m, 2), measured (m, 3) and information (m, 3, 3) of all but anchors."""
+    factors = [graph.at(i) for i in range(graph.size())]
+    between = [f for f in factors if isinstance(f, gtsam.BetweenFactorPose2)]
+    models: list[Any] = [f.noiseModel() for f in between]
+    robust = gtsam.noiseModel.Robust
+    plain: list[Any] = [m.noise() if isinstance(m, robust) else m for m in models]
+    poses = [f.measured() for f in between]
+    return (
+        np.array([f.keys() for f in between], np.int64).reshape(-1, 2),
+        np.array([(p.x(), p.y(), p.theta()) for p in poses]).reshape(-1, 3),
+        np.array([m.information() for m in plain]).reshape(-1, 3, 3),
+    )
 
 
 def anchor(node: int, pose: NDArray[np.float64]) -> gtsam.PriorFactorPose2:

@@ -12,6 +12,7 @@ from collections.abc import Collection, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
+import gtsam
 import numpy as np
 from numpy.typing import NDArray
 
@@ -58,6 +59,8 @@ class PoseGraph:
         """The smallest node id of each node's component."""
         self._edges: dict[str, Edge] = {}
         self._trees = Trees()
+        self.solved: tuple[gtsam.NonlinearFactorGraph, ...] = ()
+        """Of a settled graph: gtsam's graph of each component, with all of its factors."""
         self._clear_edges()
 
     def __getstate__(self) -> dict[str, Any]:
@@ -239,7 +242,9 @@ class PoseGraph:
         rest._poses = copy.deepcopy(self._poses)
         for root in np.unique(self._labels.rows).tolist():
             component = self._component(root)
-            rest._take_poses(np.sort(component.ids), settle(component, root))
+            poses, factors = settle(component, root)
+            rest._take_poses(np.sort(component.ids), poses)
+            rest.solved += (factors,)
         return rest
 
     def is_solved(self, node: int) -> bool:

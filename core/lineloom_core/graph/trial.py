@@ -37,7 +37,7 @@ class Trial:
     def from_optimum(cls, held: int, start: Growth) -> Trial:
         """The same, with damping first: for poses that are far off. Raises UnsettledError."""
         order = np.argsort(start.ids, kind="stable")
-        rows = settle(start, held)
+        rows, _ = settle(start, held)
         epoch = Epoch(held, replace(start, ids=start.ids[order], poses=rows))
         return cls(epoch, *epoch.estimates())
 

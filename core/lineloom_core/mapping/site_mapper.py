@@ -20,9 +20,11 @@ from lineloom_core.fusion.occupancy import Rays
 from lineloom_core.mapping.advance import advance, contradicted_by_next
 from lineloom_core.mapping.answers.evidence import Action, Evidence, WhatIf
 from lineloom_core.mapping.answers.explain import explain
+from lineloom_core.mapping.answers.factor_graph import FactorGraph
 from lineloom_core.mapping.answers.localisation import Localisation
 from lineloom_core.mapping.answers.localise import localise
 from lineloom_core.mapping.answers.ray_source import component_rays
+from lineloom_core.mapping.answers.read_factors import read_factors
 from lineloom_core.mapping.answers.site_view import SiteView
 from lineloom_core.mapping.answers.view_builder import build_view
 from lineloom_core.mapping.answers.view_change import EMPTY_VIEW, ViewChange
@@ -205,6 +207,10 @@ class SiteMapper:
     def settled(self) -> ViewChange:
         """The settled view, as the change that it is from an empty one."""
         return ViewChange.between(EMPTY_VIEW, self.view(settled=True))
+
+    def factors(self) -> FactorGraph:
+        """What gtsam holds of the settled site."""
+        return read_factors(self._shown(settled=True), self._version)
 
     def _shown(self, settled: bool) -> SiteMap:
         if not settled:

@@ -32,6 +32,7 @@ _QUESTIONS = {
     "explain": _Question(tuple[str], f"{_ANSWERS}.evidence:Evidence"),
     "localise": _Question(tuple[Sequence[Scan]], f"{_ANSWERS}.localisation:Localisation"),
     "rays": _Question(tuple[str, bool], "lineloom_core.fusion.occupancy:Rays"),
+    "factors": _Question(tuple[()], f"{_ANSWERS}.factor_graph:FactorGraph"),
     "settled": _Question(tuple[()], f"{_ANSWERS}.view_change:ViewChange"),
 }
 """Methods of the mapper that answer and change nothing: what `Engine.ask` may name."""

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Annotated
 
 from fastapi import APIRouter, Response
 from lineloom import wire
 from lineloom_core.io import g2o
-from lineloom_core.mapping.answers.site_view import SiteView
+from lineloom_core.mapping.answers.factor_graph import FactorGraph
 
 from lineloom_service.answers import JSON, IfNoneMatch, format_choice, matches, unknown_format
+from lineloom_service.asking import ask
 from lineloom_service.convert import to_graph
 from lineloom_service.dependencies import CurrentView, KnownSite, ServiceDep
 from lineloom_service.map_frames import AlignQuery, FrameQuery, in_frame, versioned
@@ -36,7 +38,8 @@ async def get_graph(
 ) -> Response:
     """Return keyframes and accepted constraints: `format` is json (node-link) or g2o.
 
-    In the floor plan's frame: those of components that have a place there.
+    In the floor plan's frame: those of components that have a place there. g2o is written from
+    gtsam's own factors and values, settled however busy the site is.
     """
     if format not in FORMATS:
         raise unknown_format(format, FORMATS)
@@ -44,12 +47,19 @@ async def get_graph(
     if matches(if_none_match, headers["ETag"]):
         return Response(status_code=304, headers=headers)
     shown = await in_frame(service, site, view, align=align, frame=frame)
-    form = ("graph", format, shown.key)
+    if format == "g2o":
+        graph: FactorGraph = await ask(service, site, "factors")
+        frames = None if frame == "map" and not align else shown.frames
+        text = await asyncio.to_thread(g2o.write_graph, graph, frames)
+        if (
+            graph.version != view.version or not view.settled
+        ):  # it is not of the view that was named
+            del headers["ETag"]
+        return Response(text, headers=headers, media_type=FORMATS[format])
     content = await service.maps.other(
-        site, shown.view, form, lambda: _render(site.name, shown.view, format)
+        site,
+        shown.view,
+        ("graph", format, shown.key),
+        lambda: to_graph(site.name, shown.view).model_dump_json(),
     )
     return Response(content, headers=headers, media_type=FORMATS[format])
-
-
-def _render(site: str, view: SiteView, format: str) -> str:
-    return g2o.write_graph(view) if format == "g2o" else to_graph(site, view).model_dump_json()

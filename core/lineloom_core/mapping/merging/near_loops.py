@@ -21,7 +21,10 @@ from lineloom_core.matching.local_map import Cloud, LocalMap
 def close_near_loop(site: SiteMap, keyframe: int) -> Constraint | None:
     """Try to tie a keyframe to an older part of its component; return the accepted constraint."""
     older = _partner(site, keyframe)
-    if older is None or site.verdicts.barred(site.id_of("near", older, keyframe)):
+    if older is None:
+        return None
+    name = site.id_of("near", older, keyframe)
+    if name in site.graph.edges or site.verdicts.barred(name):
         return None
     found = _register(site, older, keyframe)
     if found is None or is_barred(site, found):
