@@ -158,11 +158,12 @@ def _be_worker(teller: socket.socket, descriptors: Sequence[int]) -> None:
         os.environ.update(asked["env"])
         sys.path[:] = asked["env"]["PYTHONPATH"].split(os.pathsep)
         number = dict(zip(map(str, asked["descriptors"]), passed, strict=True))
-        mapper, warm_up, publish_every_s, pipe, life, current = asked["arguments"]
+        mapper, warm_up, publish_every_s, settle_after_s, pipe, life, current = asked["arguments"]
         worker.run_worker(
             mapper,
             warm_up or None,
             float(publish_every_s),
+            float(settle_after_s),
             pipe=number[pipe],
             life=number[life],
             current=number[current],
