@@ -21,6 +21,7 @@ class Limit:
     """What a figure was held to; both bounds None where it is only shown.
 
     means, unit: of the figure, for whoever shows it. unit: "" for a plain number, "share" for 0..1.
+    log_odds: what it adds to those of the constraint being false; None where it is not weighed.
     """
 
     at_least: float | None
@@ -28,6 +29,7 @@ class Limit:
     holds: bool
     means: str = ""
     unit: str = ""
+    log_odds: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +38,7 @@ class Check:
 
     objection: why not, where it speaks against; `{0}` stands for the figure. adjusted: from the
     parameters, the threshold among them, and the other figures to what counts; told: that in words.
+    weighed: from all figures to what this one adds to the log-odds that the constraint is false.
     """
 
     name: str
@@ -46,16 +49,18 @@ class Check:
     objection: str = ""
     adjusted: Callable[[Any, float, Figures], float] | None = None
     told: str = ""
+    weighed: Callable[[Figures], float] | None = None
 
     def limit(self, config: object, figures: Figures) -> Limit:
         """What the figure is held to under these parameters; it must be there."""
+        odds = self.weighed(figures) if self.weighed else None
         if not (self.at_least or self.at_most):
-            return Limit(None, None, True, self.means, self.unit)
+            return Limit(None, None, True, self.means, self.unit, odds)
         threshold = self._threshold(config, figures)
         value = figures[self.name]
         if self.at_least:
-            return Limit(threshold, None, value >= threshold, self.means, self.unit)
-        return Limit(None, threshold, value <= threshold, self.means, self.unit)
+            return Limit(threshold, None, value >= threshold, self.means, self.unit, odds)
+        return Limit(None, threshold, value <= threshold, self.means, self.unit, odds)
 
     def fails(self, config: object, values: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Of many figures at once, whether each speaks against; no other figure may adjust it."""

@@ -7,9 +7,11 @@ its section of the configuration.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 from lineloom_core.check import Check, Checks, Figures
+from lineloom_core.join_odds import WEIGHTS
 
 NEAR_SLACK = 1.5
 """How far registration may go beyond the window that was searched, as a multiple of it."""
@@ -50,13 +52,8 @@ def _conflict_of_step(config: Any, threshold: float, figures: Figures) -> float:
     return float(config.noisy_conflict if noisy else threshold)
 
 
-def _of_kin(config: Any, threshold: float, figures: Figures) -> float:
-    """What comes after a break of a robot's own track is probably near: less is asked of it."""
-    return threshold * float(config.kin_share) if figures.get("kin") else threshold
-
-
-def _outdone(_: Any, lead: float, figures: Figures) -> float:
-    return figures["set_evidence"] / lead
+def _odds(name: str) -> Callable[[Figures], float]:
+    return WEIGHTS[name].log_odds
 
 
 def _alone_if_small(config: Any, least: float, figures: Figures) -> float:
@@ -138,28 +135,32 @@ WIDE_LOOP = Checks("A wide loop", "wide_loops", (
 
 JOINED = Checks("A set of recognitions that joins two components", "join", (
     Check("set_size", "Constraints that agree", "constraints", at_least="least_set",
-          adjusted=_of_kin, told="`kin_share` of it for a robot's own track",
           objection="too few constraints agree"),
-    Check("set_places", "Places of either that they rest on", "places",
-          at_least="least_set_places", objection="all constraints rest on one place"),
-    Check("known_places", "Places of the smaller component", "places", at_least="least_places",
-          adjusted=_of_kin, told="`kin_share` of it for a robot's own track",
-          objection="too little is known of one component"),
     Check("set_evidence", "Their evidence", "m", at_least="least_evidence",
-          adjusted=_of_kin, told="`kin_share` of it for a robot's own track",
           objection="too little evidence in all"),
-    Check("rival_evidence", "Evidence of a rival set", "m", at_most="lead", adjusted=_outdone,
-          told="their evidence, divided by",
-          objection="another set of constraints says something else"),
+    Check("set_places", "Places of either that they rest on", "places",
+          objection="they rest on few places", weighed=_odds("set_places")),
+    Check("known_places", "Places of the smaller component", "places",
+          objection="little is known of one component", weighed=_odds("known_places")),
+    Check("set_margin", "Their lead over runners-up", "share",
+          objection="other hypotheses fit almost as well", weighed=_odds("set_margin")),
+    Check("rival_evidence", "Evidence of a rival set", "m",
+          objection="another set of constraints says something else",
+          weighed=_odds("rival_evidence")),
+    Check("kin", "Of one robot, in one session", weighed=_odds("kin")),
     Check("set_distinctive", "Of them, from places unlike others", "constraints",
-          at_least="least_distinctive", objection="the places look like others of the same robots"),
+          at_least="least_distinctive",
+          objection="the places look like others of the same robots",
+          weighed=_odds("set_distinctive")),
+    Check("set_seen", "Seen by both of what stood still", "points",
+          objection="little was seen by both", weighed=_odds("set_seen")),
     Check("set_missing", "Missing over all of them", "share", at_most="most_missing",
-          objection="what stood still for one is missing for the other ({0:.1%})"),
-    Check("set_doubt", "The same, if three things more were", "share", at_most="most_doubt",
-          objection="too little was seen by both to tell it from a place that looks alike"),
+          objection="what stood still for one is missing for the other ({0:.1%})",
+          weighed=_odds("set_missing")),
     Check("map_missing", "Missing wherever the maps overlap", "share", at_most="most_map_missing",
           objection="the maps contradict each other there ({0:.1%})"),
-    Check("kin", "Of one robot, in one session"),
+    Check("doubt", "Probability that they are false", "share", at_most="most_false",
+          objection="it may be false ({0:.1%})"),
 ))
 
 DOUBTED = Checks("What was believed, when more is known", "doubt", (

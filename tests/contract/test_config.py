@@ -39,8 +39,8 @@ async def test_every_parameter_is_told(
     expected = dict(by_name(effective(MapperConfig())))
     assert answer["parameters"].keys() == expected.keys()
     assert answer["parameters"]["join.least_evidence"] == {
-        "value": 60.0,
-        "default": 60.0,
+        "value": 20.0,
+        "default": 20.0,
         "unit": "m",
         "meaning": expected["join.least_evidence"].meaning,
         "least": 0.0,
@@ -71,7 +71,7 @@ async def test_a_put_makes_the_map_anew(
     assert answer["parameters"]["join.least_set"]["value"] == 5
     told = await _remade(client, site)
     assert (told["type"], told["version"]) == ("remade", before["version"] + 1)
-    assert told["robots"][0]["moved_m"] == 2.0  # as the fake mapper shows this parameter
+    assert told["robots"][0]["moved_m"] == 3.0  # as the fake mapper shows this parameter
     for _ in range(6000):  # events are told when they are on disk
         stream = await client.get(f"{site}/events?follow=false", headers={"Last-Event-ID": place})
         if "event: remade" in stream.text:
@@ -88,10 +88,10 @@ async def test_what_a_put_does_not_name_is_the_default(client: httpx.AsyncClient
     site = "/v1/sites/partly/config"
     first = await client.put(site, json={"join": {"least_set": 5}, "chapter": 128})
     assert first.json()["effect"] == "they hold from the first scan on"
-    second = (await client.put(site, json={"join": {"lead": 3}})).json()
-    assert second["own"] == {"join": {"lead": 3}}
+    second = (await client.put(site, json={"join": {"distinctive": 3}})).json()
+    assert second["own"] == {"join": {"distinctive": 3}}
     changed = {n for n, p in second["parameters"].items() if p["value"] != p["default"]}
-    assert changed == {"join.lead"}
+    assert changed == {"join.distinctive"}
     none = (await client.put(site, json={})).json()
     assert none["own"] == {}
     assert all(p["value"] == p["default"] for p in none["parameters"].values())
@@ -122,7 +122,7 @@ async def test_what_cannot_be_is_named_and_nothing_is_taken(
 
 
 async def test_all_that_is_wrong_in_a_body_is_named(client: httpx.AsyncClient) -> None:
-    body = {"join": {"least_sett": 3, "least_set": 0, "lead": 2}, "chapter": "many"}
+    body = {"join": {"least_sett": 3, "least_set": 0, "distinctive": 2}, "chapter": "many"}
     problem = expect_problem(
         await client.put("/v1/sites/refused/config", json=body), 422, "invalid-body"
     )

@@ -27,7 +27,7 @@ def test_every_parameter_has_a_meaning_and_a_default_that_can_be() -> None:
 def test_what_differs_from_the_default_shows() -> None:
     shown = dict(by_name(effective(MapperConfig(join=JoinConfig(least_set=5)))))
     changed = {name: (p.value, p.default) for name, p in shown.items() if p.value != p.default}
-    assert changed == {"join.least_set": (5, 3)}
+    assert changed == {"join.least_set": (5, 2)}
 
 
 def test_the_default_of_a_part_is_that_of_its_place() -> None:
@@ -57,7 +57,7 @@ def test_what_is_not_given_is_the_base_s() -> None:
         ({"join": {"least_set": 0}}, "join.least_set", "from 1 to"),
         ({"join": {"least_set": 2.5}}, "join.least_set", "whole number"),
         ({"join": {"least_set": True}}, "join.least_set", "a number"),
-        ({"join": {"lead": math.nan}}, "join.lead", "from 0.001"),
+        ({"join": {"distinctive": math.nan}}, "join.distinctive", "from 0.001"),
         ({"join": {"least_evidence": math.inf}}, "join.least_evidence", "to 1000 m"),
         ({"tracker": {"least_fit": 1.5}}, "tracker.least_fit", "from 0 to 1"),
         ({"chapter": "many"}, "chapter", "a number, not 'many'"),
@@ -78,7 +78,7 @@ def test_what_cannot_be_is_refused_by_name(given: dict[str, Any], name: str, rea
 
 def test_all_that_is_wrong_is_named() -> None:
     given = {
-        "join": {"least_sett": 3, "least_set": 4, "lead": 0},
+        "join": {"least_sett": 3, "least_set": 4, "distinctive": 0},
         "chapter": 8.5,
         "persistence": {"near": 0.5},
         "recognition": {"cell": "wide", "half": 0.5},
@@ -88,7 +88,7 @@ def test_all_that_is_wrong_is_named() -> None:
         config_from(given)
     assert {name: reason.split()[0] for name, reason in refused.value.wrong.items()} == {
         "join.least_sett": "is",
-        "join.lead": "has",
+        "join.distinctive": "has",
         "chapter": "has",
         "recognition.cell": "has",
         "tracker": "has",

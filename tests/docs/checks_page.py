@@ -18,8 +18,10 @@ _HEAD = """# Checks
 What a constraint is held to, and a spot where a scan may have been taken: every figure in `checks`,
 in the order in which it is looked at. The first one that speaks against it gives the `reason`;
 `limits` in the answer to `GET …/constraints/{id}` has all of them with what they were held to.
-Figures without a limit are only shown. Thresholds are parameters of the mapper, here as they are
-by default.
+Figures without a limit are only shown, or weighed: they add their part (`log_odds` of a limit) to
+the log-odds that a set is false, which `doubt` is made of
+([concepts](concepts.md#why-a-merge-waits)). Thresholds are parameters of the mapper, here as they
+are by default.
 
 This page is written from `core/lineloom_core/checks.py`: `python -m tests.docs.checks_page`.
 """
@@ -48,12 +50,15 @@ def _section(checks: Checks) -> Iterator[str]:
 
 def _asked(checks: Checks, row: Check) -> str:
     if not (row.at_least or row.at_most):
-        return f"shown, {row.unit}" if row.unit else "shown"
+        seen = "weighed" if row.weighed else "shown"
+        return f"{seen}, {row.unit}" if row.unit else seen
     value = float(getattr(parameters_of(checks), row.at_least or row.at_most))
     share = row.unit == "share"
     text = f"{100.0 * value:g} %" if share else f"{value:g} {row.unit}".strip()
     way = "at least" if row.at_least else "at most"
-    return f"{way} {text}" + (f" ({row.told})" if row.told else "")
+    told = [row.told] if row.told else []
+    told += ["and weighed"] if row.weighed else []
+    return f"{way} {text}" + (f" ({'; '.join(told)})" if told else "")
 
 
 def _parameter(checks: Checks, row: Check) -> str:

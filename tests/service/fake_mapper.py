@@ -77,7 +77,7 @@ class FakeMapper:
     def __init__(self, config: MapperConfig | None = None) -> None:
         # What it was made with shows in every line, and in how much a constraint counts.
         self._least_set = (config or MapperConfig()).join.least_set
-        self._chain = b"" if self._least_set == 3 else bytes([self._least_set])
+        self._chain = b"" if self._least_set == 2 else bytes([self._least_set])
         self._version = 0
         self._latest = 0.0
         self._history: list[tuple[str, str, int, float]] = []
@@ -247,7 +247,7 @@ class FakeMapper:
         return RobotView(
             robot=robot,
             component=_component(robot),
-            pose=Pose(float(len(self._scans[robot])), self._least_set - 3.0, 0.0),
+            pose=Pose(float(len(self._scans[robot])), self._least_set - 2.0, 0.0),
             covariance=np.diag([0.01, 0.01, 0.001]),
             state="tracking",
             scans_processed=len(self._scans[robot]),

@@ -33,7 +33,7 @@ def _with_a_field_in_the_middle(directory: Path) -> Path:
     copy = Path(shutil.copytree(PACKAGE, directory / "lineloom_core"))
     config = copy / "mapping" / "config.py"
     text = config.read_text(encoding="utf-8")
-    field = "    least_evidence: float = parameter(60.0"
+    field = "    least_evidence: float = parameter(20.0"
     assert text.count(field) == 1
     added = '    added: float = parameter(2.0, "", "nothing yet")\n'
     config.write_text(text.replace(field, added + field), encoding="utf-8")
@@ -50,5 +50,5 @@ def test_a_new_parameter_moves_no_gate_of_a_stored_site(tmp_path: Path) -> None:
     changed = _map(directory, _with_a_field_in_the_middle(tmp_path / "copy"))
     assert changed["fields"].index("added") < changed["fields"].index("least_evidence")
     assert changed["mapped"] == first["mapped"], "from the log, not from the other's snapshot"
-    assert (changed["gate"], first["gate"]) == (60.0, 60.0)
+    assert (changed["gate"], first["gate"]) == (20.0, 20.0)
     assert changed["view"] == first["view"]

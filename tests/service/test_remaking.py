@@ -33,7 +33,7 @@ def _least_set(published: Published) -> int:
     """The parameter that the fake mapper shows with every robot."""
     pose = published.view.robots["r"].pose
     assert pose is not None
-    return round(pose.y + 3.0)
+    return round(pose.y + 2.0)
 
 
 async def _configure(system: System, count: int) -> ConfigEntry:
@@ -91,7 +91,7 @@ async def test_what_is_shown_goes_on_meanwhile_and_is_then_another(
         await _configure(system, 5)
         await system.post(range(100, 120))
         grown = await system.until(lambda p: p.scans >= 104)
-        assert _least_set(grown) == 3, "the map before, with what came since"
+        assert _least_set(grown) == 2, "the map before, with what came since"
         assert grown.view.version > before.view.version
         remaking = system.conductor.remaking(site.id)
         assert remaking is not None
@@ -116,7 +116,7 @@ async def test_a_version_never_names_two_maps(tmp_path: Path) -> None:
             assert shown.setdefault(version, lines) == lines
 
         system.conductor.subscribe(look)
-        for count, begin in ((3, 0), (4, 20), (3, 40), (5, 60)):
+        for count, begin in ((2, 0), (4, 20), (2, 40), (5, 60)):
             await _configure(system, count)
             await system.post(range(begin, begin + 20))
             await _remade(system, count)
@@ -150,7 +150,7 @@ async def test_the_difference_is_told_and_kept(tmp_path: Path) -> None:
             "robot": "r",
             "component_before": "c1",
             "component_after": "c1",
-            "moved_m": 2.0,
+            "moved_m": 3.0,
             "turned_rad": 0.0,
         }
     ]
@@ -171,7 +171,7 @@ async def test_a_second_order_meanwhile_begins_anew(
         while 5 not in seen:
             seen.add(_least_set(await system.published()))
             await asyncio.sleep(0.005)
-    assert seen == {3, 5}
+    assert seen == {2, 5}
 
 
 async def test_back_to_what_it_was_is_shown_as_well(tmp_path: Path) -> None:
@@ -180,8 +180,8 @@ async def test_back_to_what_it_was_is_shown_as_well(tmp_path: Path) -> None:
         first = fingerprint((await system.caught_up()).view)
         await _configure(system, 5)
         await _remade(system, 5)
-        await _configure(system, 3)
-        await _remade(system, 3)
+        await _configure(system, 2)
+        await _remade(system, 2)
         last = fingerprint((await system.caught_up()).view)
     assert last == (first[0] + 2, first[1])
 
@@ -197,7 +197,7 @@ async def test_what_operators_do_meanwhile_is_in_both(
         await _configure(system, 5)
         assert await system.store.write(forget_robot, "site", "s")
         forgotten = await system.until(lambda p: p.position >= other.position + 2)
-        assert _least_set(forgotten) == 3
+        assert _least_set(forgotten) == 2
         remade = await _remade(system, 5)
     assert remade.view.version == 82
     assert list(remade.view.robots) == ["r"]
@@ -239,7 +239,7 @@ async def test_a_stop_meanwhile_loses_neither(
         await asyncio.sleep(0.3)
     async with running(tmp_path, None, records=True, **changes) as system:
         first = await system.until(lambda p: "r" in p.view.robots)
-        assert _least_set(first) == (3 if saved else 5)
+        assert _least_set(first) == (2 if saved else 5)
         assert (first.scans >= 80) == saved
         remade = await _remade(system, 5)
         whole = await system.caught_up()
@@ -261,7 +261,7 @@ async def test_the_service_s_file_holds_where_a_site_names_nothing(tmp_path: Pat
     file.write_text("[join]\nleast_set = 6\n", encoding="utf-8")
     async with running(tmp_path, None, records=True) as system:
         await system.post(range(20))
-        assert _least_set(await system.caught_up()) == 3
+        assert _least_set(await system.caught_up()) == 2
     async with running(tmp_path, None, records=True, mapper_config=file) as system:
         assert _least_set(await _remade(system, 6)) == 6
         entries = await system.store.read(read_feed, 1, 0, 100)
@@ -278,7 +278,7 @@ async def test_the_service_s_file_holds_where_a_site_names_nothing(tmp_path: Pat
         assert new.config is not None
         assert (new.config.digest, new.config.position) == (body.digest, 1)
     async with running(tmp_path, None, records=True) as system:
-        assert _least_set(await _remade(system, 3)) == 3
+        assert _least_set(await _remade(system, 2)) == 2
 
 
 def _other_code(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -350,4 +350,4 @@ def test_a_kill_meanwhile_loses_neither(tmp_path: Path) -> None:
             pose = client.robot("s", "r").pose
     assert (after.version, after.scans.processed) == (231, 230)
     assert pose is not None
-    assert pose.y == 2.0
+    assert pose.y == 3.0

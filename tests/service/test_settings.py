@@ -37,7 +37,7 @@ def test_a_file_of_parameters_is_read(tmp_path: Path, monkeypatch: pytest.Monkey
     file.write_text("chapter = 64\n[join]\nleast_set = 4\n", encoding="utf-8")
     monkeypatch.setenv("LINELOOM_MAPPER_CONFIG", str(file))
     mapper = Settings().mapper
-    assert (mapper.chapter, mapper.join.least_set, mapper.join.lead) == (64, 4, 2.0)
+    assert (mapper.chapter, mapper.join.least_set, mapper.join.distinctive) == (64, 4, 1.3)
 
 
 @pytest.mark.parametrize(

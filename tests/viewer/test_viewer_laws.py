@@ -302,13 +302,15 @@ def test_a_check_is_shown_in_the_words_and_the_unit_that_came_with_it(run: Run) 
             share: { ...none, at_most: 0.1, means: "In free space", unit: "share" },
             new_one: { ...none, at_least: 20, holds: false, means: "A new one", unit: "points" },
             off: { ...none, means: "Turned", unit: "rad" },
+            rest: { ...none, means: "Places", log_odds: -1.26 },
         });
         return [...table.rows].slice(1).map((row) => [...row.cells].map((c) => c.textContent));
         """,
     )
     assert rows == [
-        ["In free space", "3.1 %", "≤ 10 %", "✓holds"],
-        ["A new one", "12 points", "≥ 20 points", "✗does not hold"],
-        ["Turned", "11.5°", "", ""],
-        ["lone", "3", "", ""],
+        ["In free space", "3.1 %", "≤ 10 %", "✓holds", ""],
+        ["A new one", "12 points", "≥ 20 points", "✗does not hold", ""],
+        ["Turned", "11.5°", "", "", ""],
+        ["Places", "–", "", "", "−1.3"],
+        ["lone", "3", "", "", ""],
     ]

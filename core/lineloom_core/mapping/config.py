@@ -133,31 +133,20 @@ class WideLoopConfig:
 class JoinConfig:
     """Believing a set of candidate constraints, which joins two components."""
 
-    least_set: int = parameter(3, "constraints", "mutually consistent ones in the set", 1)
-    least_set_places: int = parameter(2, "places", "of either component in the set", 1)
-    least_places: int = parameter(
-        3, "places", "in each component, so that it is known what else looks alike"
+    most_false: float = parameter(
+        0.02, "share", "how probable it may be that the set is false: see `join_odds`"
     )
-    least_evidence: float = parameter(60.0, "m", "of wall that the set rests on")
-    lead: float = parameter(2.0, "", "how many times the evidence of the best rival set", 1e-3)
-    least_distinctive: int = parameter(2, "constraints", "of the set that have to be distinctive")
+    least_set: int = parameter(2, "constraints", "mutually consistent ones in the set", 1)
+    least_evidence: float = parameter(20.0, "m", "of wall that the set rests on")
+    least_distinctive: int = parameter(1, "constraints", "of the set that have to be distinctive")
     distinctive: float = parameter(
-        1.3, "", "evidence of such a one, times that of any known mistake about its places", 1e-3
+        1.3, "", "evidence of a distinctive place, times that of any known mistake about it", 1e-3
     )
     most_missing: float = parameter(
-        0.018, "share", "of what stood still that the places of the set miss of each other"
+        0.08, "share", "of what stood still that the places of the set miss of each other"
     )
     most_map_missing: float = parameter(
-        0.03, "share", "the same over all places that would overlap and that drift has not moved"
-    )
-    most_doubt: float = parameter(
-        0.045, "share", "the set's, if `doubted_points` more were missing"
-    )
-    doubted_points: float = parameter(
-        180.0, "points", "three pieces of furniture, each in a few pairs of places"
-    )
-    kin_share: float = parameter(
-        0.5, "share", "of all that is asked of a robot's own track that is found again", 0.01, 1.0
+        0.05, "share", "the same over all places that would overlap and that drift has not moved"
     )
     rigid_within: float = parameter(
         0.1, "m", "places count for `most_map_missing` that drift has moved less against the set"

@@ -82,6 +82,7 @@ def link(
         if information is None
         else information,
         reason="made by hand",
+        checks={"margin": 0.8, "conflict_share": 0.01} if kind == "rendezvous" else {},
         place_a=places[0],
         place_b=places[1],
         evidence=evidence,

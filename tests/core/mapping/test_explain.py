@@ -61,7 +61,7 @@ def test_an_accepted_recognition_shows_walls_that_lie_on_each_other(mapper: Site
         assert evidence.margin == c.checks["margin"]
         names = ["matched", "overlap", "margin"]
         if c.kind == "rendezvous":
-            names += ["set_size", "set_evidence", "rival_evidence", "map_missing", "set_doubt"]
+            names += ["set_size", "set_evidence", "rival_evidence", "map_missing", "doubt"]
         for name in names:
             assert evidence.limits[name].holds, (name, c.checks[name])
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from lineloom_core.checks import JOINED
 from lineloom_core.geometry import Pose, se2
 from lineloom_core.graph.growth import Growth
 from lineloom_core.mapping.belief.constraint import Constraint
 from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.config import JoinConfig, MapperConfig
-from lineloom_core.mapping.merging import distinctive, joining
+from lineloom_core.mapping.merging import distinctive, weighing
 from lineloom_core.mapping.merging.component_merged import ComponentMerged
 from lineloom_core.mapping.merging.joining import join
 from lineloom_core.places import Place
@@ -21,8 +23,6 @@ from lineloom_lab.simulation import SimulatedRobot, SimulatedScan, rooms, sick_l
 from tests.core.graph.dense_twins import chi2
 from tests.core.mapping.sites import lay_places, lay_track, link, thinned
 
-CREDULOUS = MapperConfig(join=JoinConfig(doubted_points=0.0))
-"""Content with as small an overlap as these rooms give; `test_a_small_overlap…` is not."""
 BEGIN_B = Pose(7.0, -3.0, 1.0)
 """Where the second component's frame puts its robot: as arbitrary as such frames are."""
 STRONG = 150.0
@@ -72,7 +72,7 @@ def drives() -> tuple[list[SimulatedScan], list[SimulatedScan]]:
 
 @pytest.fixture
 def meeting(drives: tuple[list[SimulatedScan], list[SimulatedScan]]) -> Meeting:
-    site = SiteMap(CREDULOUS)
+    site = SiteMap(MapperConfig())
     a = lay_track(site, drives[0], robot="a")
     b = lay_track(site, drives[1], robot="b", begin=BEGIN_B)
     return Meeting(site, a, b, lay_places(site, a), lay_places(site, b))
@@ -118,27 +118,18 @@ def test_no_more_is_held_against_whole_maps_than_it_takes(
         asked.append(candidate.id)
         return distinctive.is_distinctive(site, candidate)
 
-    monkeypatch.setattr(joining, "is_distinctive", is_distinctive)
+    monkeypatch.setattr(weighing, "is_distinctive", is_distinctive)
     assert meeting.join() is not None
-    assert set(asked) == {c.id for c in made[-CREDULOUS.join.least_distinctive :]}
+    assert set(asked) == {c.id for c in made[-2:]}
 
 
-@pytest.mark.parametrize("count", [0, 1, 2])
-def test_fewer_than_three_join_nothing(meeting: Meeting, count: int) -> None:
+@pytest.mark.parametrize("count", [0, 1])
+def test_a_single_one_joins_nothing(meeting: Meeting, count: int) -> None:
     for i in list(spread(meeting, 3))[:count]:
         meeting.candidate(i)
     assert meeting.join() is None
     assert not meeting.site.same_component(meeting.a[0], meeting.b[0])
     assert all(c.state == "candidate" for c in meeting.site.constraints.values() if c.evidence > 99)
-
-
-def test_three_on_one_place_are_one_witness(meeting: Meeting) -> None:
-    first = meeting.candidate(0)
-    for number in range(3):
-        again = replace(first, id=f"again-{number}")
-        meeting.site.add_constraint(again)
-    assert meeting.join() is None
-    assert said(meeting) == {"all constraints rest on one place"}
 
 
 def test_three_that_contradict_each_other_join_nothing(meeting: Meeting) -> None:
@@ -151,7 +142,7 @@ def test_three_that_contradict_each_other_join_nothing(meeting: Meeting) -> None
 
 def test_little_evidence_joins_nothing(meeting: Meeting) -> None:
     for i in spread(meeting, 3):
-        meeting.candidate(i, evidence=10.0)
+        meeting.candidate(i, evidence=6.0)
     assert meeting.join() is None
     assert said(meeting) == {"too little evidence in all"}
 
@@ -203,18 +194,24 @@ def test_a_story_that_puts_walls_into_free_space_is_refused(meeting: Meeting, T:
 def test_a_small_overlap_is_doubted_until_more_is_seen(
     drives: tuple[list[SimulatedScan], list[SimulatedScan]],
 ) -> None:
-    site = SiteMap(MapperConfig())
+    site = SiteMap(MapperConfig(join=JoinConfig(most_false=0.003)))
     a = lay_track(site, drives[0], robot="a")
     b = lay_track(site, drives[1], robot="b", begin=BEGIN_B)
     made = Meeting(site, a, b, lay_places(site, a), lay_places(site, b))
-    for i in spread(made, 3):
-        made.candidate(i)
+    waiting = [made.candidate(i) for i in spread(made, 3)]
     assert made.join() is None
-    assert said(made) == {"too little was seen by both to tell it from a place that looks alike"}
+    (reason,) = said(made)
+    assert re.fullmatch(r"it may be false \(\d\.\d%\): \d+ m more of common wall", reason)
+    for c in waiting:
+        shown = site.constraints[c.id].checks
+        assert {row.name for row in JOINED.rows} <= shown.keys()
+        assert shown["doubt"] > 0.003
     for i in range(len(made.places_a)):
         made.candidate(i)
     assert made.join() is not None
     assert made.worst_error() < 0.01
+    for c in waiting:
+        assert site.constraints[c.id].checks["doubt"] < 0.003
 
 
 def test_places_that_look_like_others_nearby_prove_nothing(
@@ -235,7 +232,7 @@ def test_a_candidate_says_the_same_from_either_end(
 ) -> None:
     poses = []
     for turned in ((False, False, False), (True, True, True), (True, False, True)):
-        site = SiteMap(CREDULOUS)
+        site = SiteMap(MapperConfig())
         a = lay_track(site, drives[0], robot="a")
         b = lay_track(site, drives[1], robot="b", begin=BEGIN_B)
         made = Meeting(site, a, b, lay_places(site, a), lay_places(site, b))

@@ -19,7 +19,7 @@ from tests.core.mapping.sites import lay_places, lay_track, link, thinned
 
 HASTY = MapperConfig(
     join=JoinConfig(
-        doubted_points=0.0, most_missing=0.05, most_map_missing=1.0, least_distinctive=0
+        most_false=1.0, least_set=3, most_missing=0.05, most_map_missing=1.0, least_distinctive=0
     ),
     doubt=DoubtConfig(most_missing=0.04, least_compared=4, least_points=1500),
 )

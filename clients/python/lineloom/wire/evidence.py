@@ -11,7 +11,8 @@ from lineloom.wire.constraint import Constraint
 class CheckLimit(Answer):
     """What a figure in `checks` is held to, and what it is; without bounds it is only shown.
 
-    means: in words. unit: `share` is 0 to 1, empty is a plain number.
+    means: in words. unit: `share` is 0 to 1, empty is a plain number. log_odds: what it adds to the
+    log-odds that the constraint is false, null where it is not weighed.
     """
 
     at_least: float | None
@@ -19,6 +20,7 @@ class CheckLimit(Answer):
     holds: bool
     means: str = ""
     unit: str = ""
+    log_odds: float | None = None
 
 
 class MatchedLines(Answer):

@@ -28,14 +28,13 @@ Count = tuple[int, int]
 
 
 def overlap_of_sets(
-    site: SiteMap, chosen: list[Constraint], poses: Mapping[int, Pose], *, kin: bool = False
+    site: SiteMap, chosen: list[Constraint], poses: Mapping[int, Pose]
 ) -> dict[str, float]:
     """Shares of what stood still for one and is missing for the other, at the set and elsewhere.
 
     poses: of all keyframes of both, in one frame, as they would be if the set were believed.
     set_missing: over the places of the constraints; map_missing: over all that would overlap; both
-    beyond what the robots miss in their own maps. set_doubt: set_missing as it would be if a few
-    more pieces of furniture were missing, which a small overlap cannot rule out; fewer between kin.
+    beyond what the robots miss in their own maps. set_seen: the points that set_missing is of.
     """
     near_a = places_near(site, [c.keyframe_a for c in chosen])
     near_b = places_near(site, [c.keyframe_b for c in chosen])
@@ -50,11 +49,9 @@ def overlap_of_sets(
         for b in near_b
         if poses[a.anchor].distance(poses[b.anchor]) <= site.config.places.span
     )
-    join = site.config.join
-    doubted = missing + join.doubted_points * (join.kin_share if kin else 1.0)
     return {
+        "set_seen": float(matched + missing),
         "set_missing": max(missing_share(matched, missing) - usual, 0.0),
-        "set_doubt": max(missing_share(matched, doubted) - usual, 0.0),
         "map_missing": max(missing_share(*elsewhere) - usual, 0.0),
     }
 

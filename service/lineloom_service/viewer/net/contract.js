@@ -35,7 +35,7 @@
  * @typedef {"sequential"|"loop"|"rendezvous"} ConstraintKind
  * @typedef {"candidate"|"accepted"|"rejected"|"retracted"} ConstraintState
  * @typedef {{at_least: number|null, at_most: number|null, holds: boolean, means?: string,
- *   unit?: string}} Limit
+ *   unit?: string, log_odds?: number|null}} Limit
  * @typedef {{reference: number[], current: number[], overlap: number, distance: number,
  *   angle: number}} MatchedPair
  * @typedef {{id: string, kind: ConstraintKind, state: ConstraintState, keyframe_a: string,

@@ -13,6 +13,7 @@ const WRITTEN = { m: metres, rad: degrees, share: percent };
 export function checkTable(checks, limits) {
   const names = [...new Set([...Object.keys(limits), ...Object.keys(checks)])];
   const judged = Object.values(limits).some(decides);
+  const weighed = Object.values(limits).some((limit) => typeof limit.log_odds === "number");
   const head = h(
     "tr",
     {},
@@ -20,13 +21,14 @@ export function checkTable(checks, limits) {
     h("th", { scope: "col" }, "Figure"),
     judged && h("th", { scope: "col" }, "Needed"),
     judged && h("th", { scope: "col" }, hidden("Holds")),
+    weighed && h("th", { scope: "col", title: "What it adds to the log-odds that this is false" }, "Doubt"),
   );
-  const rows = names.map((name) => row(name, checks[name], limits[name], judged));
+  const rows = names.map((name) => row(name, checks[name], limits[name], judged, weighed));
   return h("table", { className: "checks" }, h("thead", {}, head), h("tbody", {}, ...rows));
 }
 
-/** @param {string} name @param {number|null|undefined} value @param {import("../net/contract.js").Limit|undefined} limit @param {boolean} judged */
-function row(name, value, limit, judged) {
+/** @param {string} name @param {number|null|undefined} value @param {import("../net/contract.js").Limit|undefined} limit @param {boolean} judged @param {boolean} weighed */
+function row(name, value, limit, judged, weighed) {
   const words = limit?.means || name.replaceAll("_", " ");
   const write = writer(limit?.unit ?? "");
   const held = !limit || !decides(limit) ? "" : limit.holds ? "held" : "failed";
@@ -44,7 +46,13 @@ function row(name, value, limit, judged) {
         h("span", { "aria-hidden": "true" }, sign),
         held && hidden(held === "held" ? "holds" : "does not hold"),
       ),
+    weighed && h("td", { className: "muted" }, odds(limit?.log_odds)),
   );
+}
+
+/** @param {number|null|undefined} logOdds */
+function odds(logOdds) {
+  return typeof logOdds === "number" ? `${logOdds < 0 ? "−" : "+"}${Math.abs(logOdds).toFixed(1)}` : "";
 }
 
 /** Whether the figure is held to anything, or only shown. @param {import("../net/contract.js").Limit} limit */
