@@ -21,12 +21,12 @@ QUIET_S = 0.4
 
 
 @asynccontextmanager
-async def _served(path: Path) -> AsyncIterator[httpx.AsyncClient]:
+async def _served(path: Path, quiet_s: float = QUIET_S) -> AsyncIterator[httpx.AsyncClient]:
     settings = Settings(data_dir=path, gap_window_s=0.1, snapshot_idle_s=0.05)
     engine = LocalEngine(
         1,
         publish_every_s=0.05,
-        settle_after_s=QUIET_S,
+        settle_after_s=quiet_s,
         mapper="fake_mapper:FakeMapper",
         warm_up=None,
     )
@@ -110,7 +110,7 @@ async def test_it_settles_only_where_nothing_comes(tmp_path: Path) -> None:
 
 
 async def test_an_export_is_settled_however_busy_the_site(tmp_path: Path) -> None:
-    async with _served(tmp_path) as client:
+    async with _served(tmp_path, quiet_s=600.0) as client:
         await _post(client, 0)
         async with asyncio.timeout(30.0):
             while (await client.get(SITE)).json()["version"] < 1:
