@@ -15,6 +15,7 @@ from lineloom_core.graph.observability import (
     observe,
     project_out_weak,
     without_direction,
+    without_twist,
 )
 from lineloom_core.graph.piece_join import rigid_join
 from lineloom_core.graph.pose_graph import PoseGraph
@@ -37,4 +38,5 @@ __all__ = [
     "read_back",
     "rigid_join",
     "without_direction",
+    "without_twist",
 ]

@@ -116,6 +116,13 @@ def without_direction(information: NDArray[np.float64], direction: float) -> NDA
     return _without(information, np.array([math.cos(direction), math.sin(direction), 0.0]))
 
 
+def without_twist(
+    information: NDArray[np.float64], twist: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the information (3, 3) with nothing known of a motion (3,) of any length."""
+    return _without(information, twist / np.linalg.norm(twist))
+
+
 def _without(information: NDArray[np.float64], u: NDArray[np.float64]) -> NDArray[np.float64]:
     """Marginalise the coordinate along the unit vector u: I - I u u^T I / (u^T I u)."""
     Iu = information @ u

@@ -59,6 +59,11 @@ class Spot:
     misfit: float
 
     @property
+    def contradicted(self) -> float:
+        """What of that is walls in free space."""
+        return self.misfit - _kernels.UNMATCHED * (1.0 - self.matched)
+
+    @property
     def pose(self) -> Pose:
         """Of the laser in the map's frame."""
         return self.found.pose

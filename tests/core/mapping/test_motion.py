@@ -134,7 +134,7 @@ def test_small_and_even_steps_are_steady_and_large_ones_are_not() -> None:
         assert motion.expect(due).steady == steady, steps
     small, large = (steadily([s] * 5) for s in (SLOW, DRIVE))
     assert small[0].expect(small[1]).width < large[0].expect(large[1]).width
-    assert large[0].usual_way == pytest.approx(0.9)
+    assert large[0].usual[0] == pytest.approx(0.9)
 
 
 @pytest.mark.parametrize("last", [DRIVE, TURN], ids=["after driving", "after turning"])

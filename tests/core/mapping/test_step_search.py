@@ -51,7 +51,7 @@ def test_a_far_step_and_turn_are_found(step: tuple[float, float], degrees: int) 
     found = searched(world_named("rooms", 3), scanner_360(), DRIVEN, true)
     assert off(found.best.pose, true)[0] < 0.05
     assert off(found.best.pose, true)[1] < 0.01
-    assert found.axis is None
+    assert found.freedom is None
     assert found.lead > LEAST_LEAD
     assert found.best.misfit < MOST_MISFIT
 
@@ -102,8 +102,9 @@ def test_the_way_along_a_plain_corridor_is_open_and_has_no_rival(
     driven = [turn @ Pose(0.5 * k, 1.0, 0.0) for k in range(4)]
     true = driven[-1] @ Pose(step, 0.2, 0.1)
     found = searched(world, SHORT[lidar], driven, true)
-    assert found.axis is not None
-    assert abs(math.sin(found.axis - along)) < 0.03
+    assert found.freedom is not None
+    assert found.freedom.axis is not None
+    assert abs(math.sin(found.freedom.axis - along)) < 0.03
     assert found.lead > LEAST_LEAD
     across = turn.inverse() @ found.best.pose
     assert across.y == pytest.approx(1.2, abs=0.04)

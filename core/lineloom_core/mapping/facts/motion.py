@@ -110,9 +110,9 @@ class Motion:
         return self._turn_rate
 
     @property
-    def usual_way(self) -> float:
-        """What a step is usually long [m]."""
-        return self._usual[0]
+    def usual(self) -> tuple[float, float]:
+        """What a step is usually like [m, rad]."""
+        return self._usual
 
     def expect(self, stamp: float) -> Expected:
         """What to expect of a scan of this stamp."""

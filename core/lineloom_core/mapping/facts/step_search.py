@@ -4,7 +4,8 @@ Steps of `search_step`: 1. seeds: what is expected, what the pairwise matcher sa
 keyframes, and an exhaustive search around; 2. register each on the local map; 3. judge it: how
 much of the scan lies on known surfaces, how much in what the latest keyframes saw as free and the
 other way round, how surprising the step is, and whether the matcher backs it; 4. see along which
-direction the best could slide, and how far it leads any other that is no slide of it.
+direction the best could slide or about which point turn (`freedom`), and how far it leads any other
+that is no slide or turn of it.
 
 Where the matcher is certain of the latest keyframe and nothing speaks against it, step 1 ends
 there; it asks the keyframes before only where what was found so far has a rival or could slide.
@@ -21,7 +22,7 @@ from functools import partial
 
 from lineloom_core.features import ScanFeatures
 from lineloom_core.geometry import Pose, angle_difference
-from lineloom_core.graph import observe
+from lineloom_core.mapping.facts.freedom import Freedom, find_freedom
 from lineloom_core.mapping.facts.motion import PAUSE, Expected
 from lineloom_core.mapping.facts.recent import Recent
 from lineloom_core.matching._sweep import Sweep
@@ -38,15 +39,11 @@ _SEEDS = 8  # of it
 _SURPRISE = 1.5  # weight of it
 _BACKED = {"match": 5.0, "weak": 1.5, "": 0.0}
 _BACKWARDS = math.radians(100.0), 7.5  # rad, and what a turn beyond it costs
-_SLIDES = (-0.8, -0.4, 0.4, 0.8)  # m
-_SLIDE_GATE = 0.15  # m
-_SLIDE_COST = 1.0  # a slide that costs less is open
 _APART, _TURNED = 0.3, 0.15  # m, rad: from here on another spot is a rival
 _CERTAIN = 6.0  # misfit up to which a certain match needs no rival
 _NO_SURPRISE = 2.0
 _CLEAR = 8.0, 6.0  # misfit, and lead, from which on no further keyframe is compared
 _NO_RIVAL = 99.0
-_ROUND = 0.3  # share of the most that is known that must be known along every direction: no slide
 
 _MATCHER = LineMatcher()
 _Match = tuple[MatchResult, Pose]
@@ -56,13 +53,13 @@ _Match = tuple[MatchResult, Pose]
 class Searched:
     """best: the spot that is believed if any. lead: over the best rival that is no slide of it.
 
-    axis: direction [rad] in the track's frame along which the position is open, None if none is.
+    freedom: the motion in the track's frame that nothing speaks against, None if there is none.
     backing: what the matcher says of it, "match", "weak" or "".
     """
 
     best: Spot
     lead: float
-    axis: float | None
+    freedom: Freedom | None
     backing: str
 
 
@@ -71,8 +68,7 @@ def search_step(
     recent: Recent, features: ScanFeatures, cloud: Cloud, last: Pose, expected: Expected
 ) -> Searched:
     """Find where a scan was taken; `last`: the pose of the scan before."""
-    latest = Latest.of(recent.last(_COMPARED))
-    spotter = Spotter(recent.map, latest, Sweep.of(features), cloud, _COMPARED_BACK)
+    spotter = spotter_of(recent, features, cloud)
     judge = partial(_judged, last=last, expected=expected)
     matches = _matches(recent, features, 0, 1)
     spots = spotter.settle(at @ r.best for r, at in matches if r.verdict == "match" and r.best)
@@ -85,8 +81,14 @@ def search_step(
             matches += more
             spots += spotter.settle(_of_matches(more))
     found = judge(spots, matches=matches)
-    best, axis = found[0][1], _open_axis(spotter, found[0][1])
-    return Searched(best, _lead(found, axis), axis, _backing(best.pose, matches))
+    best, freedom = found[0][1], find_freedom(spotter, found[0][1])
+    return Searched(best, _lead(found, freedom), freedom, _backing(best.pose, matches))
+
+
+def spotter_of(recent: Recent, features: ScanFeatures, cloud: Cloud) -> Spotter:
+    """What judges spots of a scan by the latest keyframes."""
+    latest = Latest.of(recent.last(_COMPARED))
+    return Spotter(recent.map, latest, Sweep.of(features), cloud, _COMPARED_BACK)
 
 
 def _is_certain(spots: Sequence[Spot], expected: Expected) -> bool:
@@ -100,13 +102,13 @@ def _is_clear(spotter: Spotter, found: Sequence[tuple[float, Spot]]) -> bool:
     """Whether the best leads so far, any way that it could slide, that no keyframe changes it."""
     best = found[0][1]
     clear = best.misfit < _CLEAR[0] and _lead(found, None) > _CLEAR[1]
-    return clear and _open_axis(spotter, best) is None
+    return clear and find_freedom(spotter, best) is None
 
 
-def _lead(found: Sequence[tuple[float, Spot]], axis: float | None) -> float:
-    """How much less speaks against the first than against any other that is no slide of it."""
+def _lead(found: Sequence[tuple[float, Spot]], freedom: Freedom | None) -> float:
+    """How much less speaks against the first than against any other to which it is not free."""
     cost, best = found[0]
-    rivals = (c for c, s in found[1:] if _is_rival(s.pose, best.pose, axis))
+    rivals = (c for c, s in found[1:] if _is_rival(s.pose, best.pose, freedom))
     return min(rivals, default=cost + _NO_RIVAL) - cost
 
 
@@ -138,20 +140,6 @@ def _judged(
     return sorted(found, key=lambda row: row[0])
 
 
-def _open_axis(spotter: Spotter, best: Spot) -> float | None:
-    """Step 4: the direction along which hardly anything speaks against a slide."""
-    seen, at = observe(best.found.information), best.pose
-    if seen.lambda_min > _ROUND * seen.lambda_max:
-        return None
-    axis = seen.least_known
-    c, s = math.cos(axis), math.sin(axis)
-    slides = [Pose(at.x + way * c, at.y + way * s, at.theta) for way in _SLIDES]
-    for there in spotter.settle(slides, gate=_SLIDE_GATE, iterations=0, near=0.0):
-        if there.misfit - best.misfit < _SLIDE_COST:
-            return axis
-    return None
-
-
 def _backing(pose: Pose, matches: Iterable[_Match]) -> str:
     """The best that any match says of a pose."""
     backing = ""
@@ -174,7 +162,6 @@ def _across(a: Pose, b: Pose, axis: float) -> float:
     return abs(-math.sin(axis) * (a.x - b.x) + math.cos(axis) * (a.y - b.y))
 
 
-def _is_rival(a: Pose, b: Pose, axis: float | None) -> bool:
-    if abs(angle_difference(a.theta, b.theta)) > _TURNED:
-        return True
-    return (a.distance(b) if axis is None else _across(a, b, axis)) > _APART
+def _is_rival(a: Pose, b: Pose, freedom: Freedom | None) -> bool:
+    near = b if freedom is None else freedom.nearest(a)
+    return abs(angle_difference(a.theta, near.theta)) > _TURNED or a.distance(near) > _APART
