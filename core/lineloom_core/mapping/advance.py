@@ -2,7 +2,8 @@
 
 Steps of `advance`: 1. the keyframe and its step enter the graph; 2. loops are closed with older
 keyframes that the graph says are near; 3. every few metres, a place is made of the last keyframes
-and looked for among all others; 4. sets of candidates that agree are believed, components joined
+and looked for among all others, sooner where its robot lost its track, and what was left of that
+one is as well; 4. sets of candidates that agree are believed, components joined
 and tied together where they run near each other; 5. what the new place contradicts is named;
 6. else places are let go where more than enough show the same.
 """
@@ -10,7 +11,7 @@ and tied together where they run near each other; 5. what the new place contradi
 from __future__ import annotations
 
 from lineloom_core.mapping.belief.constraint import Constraint
-from lineloom_core.mapping.belief.place_making import place_is_due, recent_keyframes
+from lineloom_core.mapping.belief.place_making import left_over, place_is_due, recent_keyframes
 from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.belief.thinning import thin
 from lineloom_core.mapping.belief.track import Track
@@ -30,23 +31,27 @@ is one for so many keyframes."""
 
 def advance(site: SiteMap, keyframe: Keyframe) -> Changes:
     """Take the next keyframe of the history; what is withdrawn is still believed in `site`."""
-    site.append(keyframe)
+    step = site.append(keyframe)
     moved = _near_loop_if_due(site, keyframe.id)
-    place = _place_if_due(site, site.track(keyframe.id)) if keyframe.trusted else None
-    if place is None:
-        return Changes(placed=True, keyframe=keyframe.name, optimised=moved)
-    merges, moved_too = consider(site, place)
-    for merge in merges:
-        _tie_after(site, merge)
-    contradicted = contradicted_by(site, place)
-    if not contradicted:
-        thin(site, place)
+    places = _places_due(site, keyframe, strayed=step is None) if keyframe.trusted else []
+    merges: list[ComponentMerged] = []
+    contradicted: list[Constraint] = []
+    for place in places:
+        merged, moved_too = consider(site, place)
+        for merge in merged:
+            _tie_after(site, merge)
+        against = contradicted_by(site, place)
+        if not against:
+            thin(site, place)
+        merges += merged
+        contradicted += [c for c in against if c not in contradicted]
+        moved = moved or moved_too or bool(against)
     return Changes(
         placed=True,
         keyframe=keyframe.name,
         merges=tuple(merges),
-        withdrawn=contradicted,
-        optimised=moved or moved_too or bool(contradicted),
+        withdrawn=tuple(contradicted),
+        optimised=moved,
     )
 
 
@@ -73,18 +78,23 @@ def _near_loop_if_due(site: SiteMap, keyframe: int) -> bool:
     return True
 
 
-def _place_if_due(site: SiteMap, track: Track) -> Place | None:
-    """Make a place when the robot has driven on far enough."""
-    config = site.config.places
-    if not place_is_due(track, config):
-        return None
+def _places_due(site: SiteMap, keyframe: Keyframe, *, strayed: bool) -> list[Place]:
+    """Make a place when the robot has driven on far enough; what it left where it has strayed."""
+    track, config = site.track(keyframe.id), site.config.places
+    if strayed:
+        former = site.track_before(track)
+        return [] if former is None else _made(site, former, left_over(former, config))
+    if not place_is_due(track, config, strayed=site.has_strayed(track)):
+        return []
     track.last_place_at = track.travelled[-1]
     members = recent_keyframes(track, config)
-    if len(members) < config.least_keyframes:
-        return None
-    place = site.add_place(tuple(members))
-    track.places.append(place.id)
-    return place
+    return _made(site, track, [members] if len(members) >= config.least_keyframes else [])
+
+
+def _made(site: SiteMap, track: Track, groups: list[list[int]]) -> list[Place]:
+    places = [site.add_place(tuple(members)) for members in groups]
+    track.places = sorted([*track.places, *(place.id for place in places)])
+    return places
 
 
 def _tie_after(site: SiteMap, merge: ComponentMerged) -> None:

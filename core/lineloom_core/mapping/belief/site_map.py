@@ -144,6 +144,21 @@ class SiteMap:
         """Whether no later track of its robot is known: it may go on."""
         return self._latest_track[track.robot] is track
 
+    def track_before(self, track: Track) -> Track | None:
+        """The track that its robot was on before in the same session."""
+        drive = self._drive(track)
+        before = [t for t in self.tracks.values() if self._drive(t) == drive and t is not track]
+        return before[-1] if before else None
+
+    def has_strayed(self, track: Track) -> bool:
+        """Whether its robot drove elsewhere before in the same session, and nobody knows where."""
+        drive = self._drive(track)
+        return any(
+            self._drive(other) == drive and not self.same_component(other.kept[0], track.kept[0])
+            for other in self.tracks.values()
+            if other is not track
+        )
+
     def same_track(self, a: int, b: int) -> bool:
         """Whether tracking alone links two keyframes."""
         return self._track_of[a] is self._track_of[b]
