@@ -14,7 +14,6 @@ from lineloom_core.mapping.belief.constraint import Constraint
 from lineloom_core.mapping.belief.place_making import left_over, place_is_due, recent_keyframes
 from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.belief.thinning import thin
-from lineloom_core.mapping.belief.track import Track
 from lineloom_core.mapping.changes import Changes
 from lineloom_core.mapping.facts.keyframe import Keyframe
 from lineloom_core.mapping.merging.candidates import consider
@@ -33,10 +32,12 @@ def advance(site: SiteMap, keyframe: Keyframe) -> Changes:
     """Take the next keyframe of the history; what is withdrawn is still believed in `site`."""
     step = site.append(keyframe)
     moved = _near_loop_if_due(site, keyframe.id)
-    places = _places_due(site, keyframe, strayed=step is None) if keyframe.trusted else []
     merges: list[ComponentMerged] = []
     contradicted: list[Constraint] = []
-    for place in places:
+    for members in _due(site, keyframe, strayed=step is None) if keyframe.trusted else ():
+        if not all(k in site.keyframes for k in members):
+            continue  # let go just now, for the place before
+        place = _made(site, members)
         merged, moved_too = consider(site, place)
         for merge in merged:
             _tie_after(site, merge)
@@ -78,23 +79,27 @@ def _near_loop_if_due(site: SiteMap, keyframe: int) -> bool:
     return True
 
 
-def _places_due(site: SiteMap, keyframe: Keyframe, *, strayed: bool) -> list[Place]:
-    """Make a place when the robot has driven on far enough; what it left where it has strayed."""
+def _due(site: SiteMap, keyframe: Keyframe, *, strayed: bool) -> list[list[int]]:
+    """Keyframes of the place that is due when the robot has driven on far enough.
+
+    Or of all that it left behind, where it has strayed.
+    """
     track, config = site.track(keyframe.id), site.config.places
     if strayed:
         former = site.track_before(track)
-        return [] if former is None else _made(site, former, left_over(former, config))
+        return [] if former is None else left_over(former, config)
     if not place_is_due(track, config, strayed=site.has_strayed(track)):
         return []
     track.last_place_at = track.travelled[-1]
     members = recent_keyframes(track, config)
-    return _made(site, track, [members] if len(members) >= config.least_keyframes else [])
+    return [members] if len(members) >= config.least_keyframes else []
 
 
-def _made(site: SiteMap, track: Track, groups: list[list[int]]) -> list[Place]:
-    places = [site.add_place(tuple(members)) for members in groups]
-    track.places = sorted([*track.places, *(place.id for place in places)])
-    return places
+def _made(site: SiteMap, members: list[int]) -> Place:
+    place = site.add_place(tuple(members))
+    track = site.track(members[-1])
+    track.places = sorted([*track.places, place.id])
+    return place
 
 
 def _tie_after(site: SiteMap, merge: ComponentMerged) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections import deque
 from typing import IO
 
 _LITTLE = 1 << 20
@@ -19,6 +20,7 @@ class Spool:
         self._file: IO[bytes] | None = None
         self._where: dict[int, tuple[int, int] | bytes] = {}
         self._end = self._used = self._next = 0
+        self._dropped: deque[int] = deque()
 
     def __len__(self) -> int:
         """Number of blocks that are there."""
@@ -26,6 +28,8 @@ class Spool:
 
     def append(self, block: bytes) -> int:
         """Add a block; return its number."""
+        while self._dropped:
+            self.discard(self._dropped.popleft())
         self._put(self._next, block)
         self._next += 1
         return self._next - 1
@@ -47,6 +51,10 @@ class Spool:
         self._used -= where[1]
         if self._end > 2 * self._used + _LITTLE:
             self._rewrite()
+
+    def drop(self, number: int) -> None:
+        """Discard a block when the next one comes: may be called in the midst of anything."""
+        self._dropped.append(number)
 
     def _put(self, number: int, block: bytes) -> None:
         try:
@@ -79,7 +87,8 @@ class Spooled:
         self._number = spool.append(block)
 
     def __del__(self) -> None:
-        self._spool.discard(self._number)
+        # The collector may come while the spool is being rewritten.
+        self._spool.drop(self._number)
 
     def read(self) -> bytes:
         """Return the block."""
