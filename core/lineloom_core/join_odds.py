@@ -2,9 +2,10 @@
 
 A logistic model of the figures of `checks.JOINED`, one row each: what is made of the figure, and
 how much that weighs. Each row's part, about what is usual, is what it adds to the log-odds that the
-set is false; with `PRIOR` they make the sum. Fitted on simulated trials over many lidars and buildings such
-as `python -m lineloom_lab.evaluation.join_calibration` makes, which holds every weight to the sign
-that reason gives it, and frozen here. Its small probabilities are too sure: a threshold, no rate.
+set is false; with `PRIOR` they make the sum. Fitted on simulated trials over many lidars and
+buildings such as `python -m lineloom_lab.evaluation.join_calibration` makes, which holds every
+weight to the sign that reason gives it, and frozen here. Small probabilities are too sure: a
+threshold, no rate.
 """
 
 from __future__ import annotations
