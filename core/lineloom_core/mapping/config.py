@@ -146,7 +146,7 @@ class JoinConfig:
         0.08, "share", "of what stood still that the places of the set miss of each other"
     )
     most_map_missing: float = parameter(
-        0.05, "share", "the same over all places that would overlap and that drift has not moved"
+        0.03, "share", "the same over all places that would overlap and that drift has not moved"
     )
     rigid_within: float = parameter(
         0.1, "m", "places count for `most_map_missing` that drift has moved less against the set"
