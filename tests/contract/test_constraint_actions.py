@@ -27,7 +27,7 @@ async def url(client: httpx.AsyncClient, make_scan: Make, idle: Idle, site: str)
 async def test_evidence_comes_with_a_constraint(client: httpx.AsyncClient, url: str) -> None:
     found = (await client.get(f"{url}/k0-1")).json()
     limit: dict[str, Any] = {"at_least": None, "at_most": 0.1, "holds": True}
-    limit |= {"means": "Points in free space", "unit": "share"}
+    limit |= {"means": "Points in free space", "unit": "share", "log_odds": None}
     assert found["limits"] == {"conflict": limit}
     assert found["matched"][0]["current"] == [0.0, 0.0, 1.0, 0.1]
     assert found["conflicts"] == [[0.5, 0.5]]

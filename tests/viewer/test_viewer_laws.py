@@ -215,12 +215,12 @@ def test_changes_make_the_same_map_as_the_whole(run: Run) -> None:
         second[0] = line(10, 7);
         const asked = [];
         const api = {
-            get: async (path) => { asked.push(path); return { version: 4, lines: first }; },
+            get: async (path) => { asked.push(path); return { version: 4, settled: false, lines: first }; },
             open: async (path) => {
                 asked.push(path);
                 const removed = first.slice(0, 10).map(({ id }) => id);
                 const lines = [second[0], line(5000, 1)];
-                const change = { version: 9, full: false, removed, lines };
+                const change = { version: 9, settled: false, full: false, removed, lines };
                 return { json: async () => change };
             },
         };
@@ -234,7 +234,7 @@ def test_changes_make_the_same_map_as_the_whole(run: Run) -> None:
         return [asked, now.version, byId(now.lines) === byId(second)];
         """,
     )
-    assert found == [["map", "map?since=4", "map"], 9, True]
+    assert found == [["map", "map?since=4&since_settled=false", "map"], 9, True]
 
 
 def test_a_line_set_that_was_brought_up_to_date_is_one_made_anew(run: Run) -> None:

@@ -117,7 +117,7 @@ def test_trajectory_and_graph_for_scripts(loopback: str, fake: FakeService) -> N
     about = {"site": "default", "version": 3}
     answers(fake, "GET", f"{SITE}/graph", {"graph": about, "nodes": [], "edges": []})
     found = json.loads(run("graph", "--json", "--url", loopback).stdout)["graph"]
-    assert found == {**about, "submaps": []}
+    assert found == {**about, "settled": False, "submaps": []}
 
 
 def test_exports_are_made_listed_fetched_and_removed(
@@ -125,7 +125,7 @@ def test_exports_are_made_listed_fetched_and_removed(
 ) -> None:
     answers(fake, "POST", f"{SITE}/exports", EXPORT, 201)
     made = run("export", "create", "--component", "c0", "--url", loopback, "--json")
-    assert json.loads(made.stdout) == EXPORT
+    assert json.loads(made.stdout) == {**EXPORT, "settled": False}
     sent = json.loads(fake.requests[-1].content)
     assert (sent["format"], sent["component"]) == ("nav2", "c0")
     assert str(EXPORT["sha256"]) in run("export", "create", "--url", loopback).stdout

@@ -18,8 +18,8 @@ from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.graph import observe, without_twist
 from lineloom_core.matching.spots import Spot, Spotter
 
-_SLIDES = (-0.8, -0.4, 0.4, 0.8)  # m
-_TURNS = (-0.3, -0.15, 0.15, 0.3)  # rad
+_SLIDES = tuple((way,) for way in (-0.8, -0.4, 0.4, 0.8))  # m
+_TURNS = (-0.3, -0.6), (0.3, 0.6)  # rad: near a wall, less moves nothing beyond the gate
 _GATE = 0.15  # m
 _COST = 1.0  # what costs less is free
 _ROUND = 0.3  # share of the most that is known that must be known along every direction: no slide
@@ -100,10 +100,14 @@ def free_turn(spotter: Spotter, best: Spot) -> Freedom | None:
     return turn if _is_free(spotter, best, turn, _TURNS) else None
 
 
-def _is_free(spotter: Spotter, best: Spot, freedom: Freedom, ways: tuple[float, ...]) -> bool:
-    moved = [freedom.moved(way) for way in ways]
-    there = spotter.settle(moved, gate=_GATE, iterations=0, near=0.0)
-    return any(spot.misfit - best.misfit < _COST for spot in there)
+def _is_free(
+    spotter: Spotter, best: Spot, freedom: Freedom, ways: tuple[tuple[float, ...], ...]
+) -> bool:
+    """Whether one of these runs of ways costs hardly anything wherever it is along it."""
+    moved = [freedom.moved(way) for run in ways for way in run]
+    there = iter(spotter.settle(moved, gate=_GATE, iterations=0, near=0.0))
+    costs = [[next(there).misfit - best.misfit for _ in run] for run in ways]
+    return any(max(run) < _COST for run in costs)
 
 
 def least_known_turn(
