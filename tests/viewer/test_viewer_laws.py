@@ -215,7 +215,10 @@ def test_changes_make_the_same_map_as_the_whole(run: Run) -> None:
         second[0] = line(10, 7);
         const asked = [];
         const api = {
-            get: async (path) => { asked.push(path); return { version: 4, settled: false, lines: first }; },
+            get: async (path) => {
+                asked.push(path);
+                return { version: 4, settled: false, lines: first };
+            },
             open: async (path) => {
                 asked.push(path);
                 const removed = first.slice(0, 10).map(({ id }) => id);
