@@ -3,9 +3,9 @@
 Steps of `advance`: 1. the keyframe and its step enter the graph; 2. loops are closed with older
 keyframes that the graph says are near; 3. every few metres, a place is made of the last keyframes
 and looked for among all others, sooner where its robot lost its track, and what was left of that
-one is as well; 4. sets of candidates that agree are believed, components joined
-and tied together where they run near each other; 5. what the new place contradicts is named;
-6. else places are let go where more than enough show the same.
+one is as well; 4. sets of candidates that agree are believed, components joined and tied together
+where they run near each other; 5. what the new place contradicts is named; 6. else places are let
+go where more than enough show the same.
 """
 
 from __future__ import annotations
@@ -88,7 +88,9 @@ def _due(site: SiteMap, keyframe: Keyframe, *, strayed: bool) -> list[list[int]]
     if strayed:
         former = site.track_before(track)
         return [] if former is None else left_over(former, config)
-    if not place_is_due(track, config, strayed=site.has_strayed(track)):
+    # Of all tracks it is asked only while a track is young: there may be hundreds.
+    young = track.travelled[-1] < config.span
+    if not place_is_due(track, config, strayed=young and site.has_strayed(track)):
         return []
     track.last_place_at = track.travelled[-1]
     members = recent_keyframes(track, config)
