@@ -10,6 +10,7 @@ import typer
 
 from lineloom.cli import options
 from lineloom.cli.bench_ladders import ladders
+from lineloom.cli.bench_lines import lines
 from lineloom.cli.bench_logs import logs
 from lineloom.cli.bench_merges import merges
 from lineloom.cli.console import note, out, print_json
@@ -29,11 +30,12 @@ app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 app.command("merges")(merges)
 app.command("logs")(logs)
 app.command("ladders")(ladders)
+app.command("lines")(lines)
 
 
 @app.callback()
 def bench() -> None:
-    """Measure how good the matchers are, what becomes of real logs, and how safe the merging is.
+    """Measure how good matchers and lines are, what becomes of real logs, how safe merging is.
 
     \b
     Example:
