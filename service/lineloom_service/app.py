@@ -15,6 +15,7 @@ from lineloom_service.observation.requests import RequestObserver
 from lineloom_service.pacing import IngestPacing
 from lineloom_service.routes import OPEN_ROUTERS, ROUTERS, allowed_methods, docs, viewer
 from lineloom_service.security.headers import SecurityHeaders
+from lineloom_service.security.quotas import QuotaEnd
 from lineloom_service.service import Service
 from lineloom_service.settings import Settings
 
@@ -56,6 +57,7 @@ def create_app(settings: Settings | None = None, *, service: Service | None = No
     if served.settings.allow_origins:
         _allow_origins(app, served.settings.allow_origins)
     app.add_middleware(BodyAdmission, budget=served.bodies)
+    app.add_middleware(QuotaEnd)
     app.add_middleware(IngestPacing, pacer=served.pacer)
     # The last one added is the outermost.
     app.add_middleware(RequestObserver, metrics=served.metrics)

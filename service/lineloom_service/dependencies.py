@@ -12,7 +12,8 @@ from lineloom.wire import ID_PATTERN
 from lineloom_core.mapping.answers.site_view import SiteView
 
 from lineloom_service.errors import UNKNOWN_ROBOT, UNKNOWN_SITE, ProblemError
-from lineloom_service.security.scopes import scope_of
+from lineloom_service.security.quotas import hold
+from lineloom_service.security.scopes import ABOUT_NO_SITE, scope_of
 from lineloom_service.service import Service
 from lineloom_service.store.records import RobotRecord, SiteRecord
 
@@ -32,15 +33,26 @@ ServiceDep = Annotated[Service, Depends(get_service)]
 
 
 async def admitted(request: Request, service: ServiceDep) -> None:
-    """Let pass whoever has a token with the route's scope, or answer 401 or 403."""
+    """Let pass whoever has a token with the route's scope, or answer 401, 403 or 429.
+
+    Without tokens: whoever does not come by another's name or page, or answer 421 or 403.
+    """
     path: str = request.scope["route"].path
     names = request.path_params
-    request.state.token_id = await service.guard.admit(
+    token = await service.guard.admit(
         request.headers.get("authorization"),
         scope_of(request.method, path),
         names.get("site"),
         names.get("robot"),
+        anywhere=path in ABOUT_NO_SITE,
     )
+    request.state.token_id = None if token is None else token.id
+    request.state.only_site = None if token is None else token.site
+    if token is None:
+        server = request.scope.get("server") or (None, None)
+        service.hosts.check(request.method, request.headers, server[0])
+    else:
+        hold(request.scope, service.quotas.take(token.id, stream=path.endswith("/events")))
 
 
 async def known_site(name: SiteName, service: ServiceDep) -> SiteRecord:

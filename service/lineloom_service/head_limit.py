@@ -9,7 +9,8 @@ from typing import Any
 
 from starlette.types import ASGIApp, Receive, Scope, Send
 from uvicorn import Config
-from uvicorn.protocols.http.auto import AutoHTTPProtocol
+
+from lineloom_service.head_size import BoundedHeads
 
 _CONNECTION = "lineloom.connection"
 """Where a request's connection is in the `state` of its ASGI scope."""
@@ -106,7 +107,7 @@ def head_limited(patience_s: float) -> type[asyncio.Protocol]:
         def __init__(self, config: Config, app_state: dict[str, Any], **more: Any) -> None:
             def inner(state: dict[str, Any]) -> asyncio.Protocol:
                 arguments = {"config": config, "app_state": {**app_state, **state}, **more}
-                return AutoHTTPProtocol(**arguments)
+                return BoundedHeads(**arguments)
 
             super().__init__(inner, patience_s)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -15,7 +14,8 @@ from lineloom_core.fusion.occupancy import (
 )
 from lineloom_core.geometry import Pose
 from lineloom_core.io import nav2
-from lineloom_core.io.selection import BBox, check_bbox
+from lineloom_core.io.png import PictureTooLargeError
+from lineloom_core.io.selection import MOST_COORDINATE_M, BBox, check_bbox
 from lineloom_core.mapping.answers.site_view import SiteView
 
 from lineloom_service.asking import ask
@@ -58,9 +58,12 @@ async def render_map(
         raise ProblemError(INVALID_PARAMETER, "resolution: only a nav2 map has one")
     form = (format, component, box, shown.key)
     write = _json if format == "json" else import_module(f"{_WRITERS}.{format}").write_map
-    return await service.maps.other(
-        site, shown.view, form, lambda: write(shown.view, component, box, site.name)
-    )
+    try:
+        return await service.maps.drawn(
+            site, shown.view, form, lambda: write(shown.view, component, box, site.name)
+        )
+    except PictureTooLargeError as error:
+        raise ProblemError(INVALID_PARAMETER, f"format: {error}") from None
 
 
 def ray_source(service: Service, site: SiteRecord, view: SiteView) -> RaySource:
@@ -82,7 +85,10 @@ def read_bbox(text: str | None) -> BBox | None:
         box = (x_min, y_min, x_max, y_max)
         check_bbox(box)
     except ValueError:
-        detail = "query parameter 'bbox': must be x_min,y_min,x_max,y_max with min < max"
+        detail = (
+            "query parameter 'bbox': must be x_min,y_min,x_max,y_max with min < max, "
+            f"within {MOST_COORDINATE_M / 1000:g} km of the origin"
+        )
         raise ProblemError(INVALID_PARAMETER, detail) from None
     return box
 
@@ -107,11 +113,12 @@ async def _nav2(
         raise ProblemError(INVALID_PARAMETER, detail)
     T = shown.frames.get(chosen, Pose.identity())
     rays = (await ray_source(service, site, shown.view)(chosen)).moved(T)
-    lines = lines_of(shown.view, chosen)
+    lines, cell = lines_of(shown.view, chosen), resolution or DEFAULT_RESOLUTION_M
+    # Free space may be some scans newer than the view: the keyframes tell one from the next.
+    form = ("nav2", chosen, box, shown.key, cell, rays.poses.tobytes())
     try:
-        grid = await asyncio.to_thread(
-            rasterise, rays, lines, resolution or DEFAULT_RESOLUTION_M, box
+        return await service.maps.drawn(
+            site, shown.view, form, lambda: nav2.write_map(rasterise(rays, lines, cell, box))
         )
     except GridTooLargeError as error:
         raise ProblemError(INVALID_PARAMETER, f"resolution: {error}") from None
-    return await asyncio.to_thread(nav2.write_map, grid)

@@ -28,6 +28,11 @@ _MOST_MEMBERS = 64
 _MOST_ITEMS = 100_000
 """In one msgpack array or map: a header alone makes the decoder set so much memory aside."""
 
+_MOST_CONTAINERS = 100_000
+_MOST_VALUES = 5_000_000
+"""In a whole body. A thousand scans of two thousand beams have half of these; an empty list costs
+one byte as msgpack, next to nothing with gzip, and 72 bytes of memory."""
+
 _GZIP = 31  # zlib's window bits for "a gzip header and trailer, nothing else"
 
 
@@ -124,6 +129,9 @@ def _gunzip(data: bytes, limit: int) -> bytes:
 
 
 def _decode_json(data: bytes) -> Any:
+    # Signs within texts count as well: none that is meant has so many.
+    containers = data.count(b"[") + data.count(b"{")
+    _check_values(containers, containers + data.count(b",") + data.count(b":"))
     try:
         # NaN and Infinity pass here, to be refused later by the field that has them.
         return from_json(data, allow_inf_nan=True)
@@ -132,11 +140,47 @@ def _decode_json(data: bytes) -> Any:
 
 
 def _decode_msgpack(data: bytes) -> Any:
+    values = _Values()
     try:
-        return msgpack.unpackb(data, max_array_len=_MOST_ITEMS, max_map_len=_MOST_ITEMS)
+        return msgpack.unpackb(
+            data,
+            max_array_len=_MOST_ITEMS,
+            max_map_len=_MOST_ITEMS,
+            list_hook=values.take_list,
+            object_hook=values.take_map,
+        )
     except ValueError as error:
         reason = str(error) or type(error).__name__
         raise ProblemError(MALFORMED_BODY, f"the body is not msgpack: {reason}") from error
+
+
+class _Values:
+    """Counts what is decoded, container by container."""
+
+    def __init__(self) -> None:
+        self._containers = self._values = 0
+
+    def take_list(self, found: list[Any]) -> list[Any]:
+        self._take(1 + len(found))
+        return found
+
+    def take_map(self, found: dict[Any, Any]) -> dict[Any, Any]:
+        self._take(1 + 2 * len(found))
+        return found
+
+    def _take(self, values: int) -> None:
+        self._containers += 1
+        self._values += values
+        _check_values(self._containers, self._values)
+
+
+def _check_values(containers: int, values: int) -> None:
+    if containers > _MOST_CONTAINERS or values > _MOST_VALUES:
+        detail = (
+            f"a body may hold {_MOST_VALUES} values in {_MOST_CONTAINERS} lists and objects; send "
+            "fewer scans at a time"
+        )
+        raise ProblemError(TOO_LARGE, detail)
 
 
 def _too_large(limit: int) -> ProblemError:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 from functools import partial
 
@@ -20,13 +21,17 @@ from lineloom_service.maps.map_store import MapStore
 from lineloom_service.matching import PairMatcher
 from lineloom_service.observation.latency import Latency
 from lineloom_service.observation.metrics import Metrics, SiteFigures
+from lineloom_service.observation.storage_watch import StorageWatch
 from lineloom_service.pacing import Pacer
+from lineloom_service.plan_reading import PlanReader
 from lineloom_service.security.guard import Guard
+from lineloom_service.security.hosts import Hosts
+from lineloom_service.security.quotas import Allowance, Quotas
 from lineloom_service.security.token_book import read_tokens
 from lineloom_service.settings import Settings
 from lineloom_service.store.choice import database_at
 from lineloom_service.store.protocol import NewsKind, Store
-from lineloom_service.store.records import SiteRecord
+from lineloom_service.store.records import SiteRecord, StoreError
 from lineloom_service.store.sql_store import SqlStore
 
 _LOG = logging.getLogger(__name__)
@@ -61,12 +66,18 @@ class Service:
         self.store.subscribe_news(self._on_news)
         self.matcher = PairMatcher()
         self.floorplans = FloorPlans(self.store)
+        self.plans = PlanReader()
         self.guard = Guard(partial(self.store.read, read_tokens))
+        self.hosts = Hosts((*settings.allow_hosts, settings.host), settings.allow_origins)
+        self.quotas = Quotas(
+            Allowance(settings.token_requests, settings.token_streams, settings.token_rate)
+        )
+        self.storage = StorageWatch(self.store.check)
         self.metrics = Metrics()
         self._latency = Latency()
         self._sites_seen: list[SiteRecord] = []
         self.metrics.watch(
-            self.site_figures, self.engine.durations, self._latency.histogram, self.not_ready
+            self.site_figures, self.engine.durations, self._latency.histogram, self.readiness
         )
         self._warming: asyncio.Task[None] | None = None
         self._taking = False
@@ -118,8 +129,10 @@ class Service:
             self.events.wake(int(key))
 
     async def look_around(self) -> None:
-        """Find out which sites there are, for the figures."""
-        self._sites_seen = await self.store.sites()
+        """Find out which sites there are, and whether more can be stored, for the figures."""
+        await self.look_at_storage()
+        with contextlib.suppress(StoreError):  # the figures are wanted most while it fails
+            self._sites_seen = await self.store.sites()
 
     def site_figures(self) -> list[SiteFigures]:
         """Return how every site is doing."""
@@ -130,6 +143,7 @@ class Service:
                 record.held,
                 published.view,
                 0 if remaking is None else max(0, remaking.of - remaking.position),
+                self.trouble(record.id) is not None,
             )
             for record in self._sites_seen
             for published in [self.conductor.published(record.id)]
@@ -140,12 +154,27 @@ class Service:
         """Return why scans are not mapped, or pairs not matched at once; empty when they are."""
         return self.conductor.not_ready() + self.matcher.not_ready()
 
+    def trouble(self, site_id: int) -> str | None:
+        """Return what is wrong with a site now, in words; None where all is well."""
+        failure = self.storage.failure
+        taken = None if failure is None else f"nothing can be taken: {failure}"
+        return "; ".join(filter(None, (taken, self.conductor.trouble(site_id)))) or None
+
+    async def look_at_storage(self) -> None:
+        """Find out whether more can be stored, for those who ask next."""
+        if self._taking:
+            await self.storage.look()
+
     def readiness(self) -> wire.Readiness:
         """Return whether scans are taken, whether they are mapped, and why not."""
         missing = self.not_ready()
-        stopped = [] if self._taking else ["the service is not open: it starts or stops"]
+        refuses = self.storage.failure
+        if not self._taking:
+            refuses = "the service is not open: it starts or stops"
         return wire.Readiness(
-            takes_scans=self._taking, maps=self._taking and not missing, reasons=stopped + missing
+            takes_scans=refuses is None,
+            maps=self._taking and not missing,
+            reasons=([] if refuses is None else [refuses]) + missing,
         )
 
 

@@ -41,6 +41,14 @@ class Settings(BaseSettings):
     allow_origins: Annotated[tuple[str, ...], NoDecode] = Field(
         default=(), description="Origins whose pages may call the service, comma-separated."
     )
+    public_url: str | None = Field(
+        default=None,
+        pattern=r"^https?://[^/?#]+(/[^?#]*)?$",
+        description="Where clients reach the service: how links to exports begin.",
+    )
+    allow_hosts: Annotated[tuple[str, ...], NoDecode] = Field(
+        default=(), description="Names of the service beside this machine's, comma-separated."
+    )
     log_level: Literal["debug", "info", "warning", "error"] = "info"
     log_format: Literal["json", "text"] = "json"
 
@@ -77,6 +85,17 @@ class Settings(BaseSettings):
     )
     group_limit: int = Field(
         default=256, ge=1, description="Requests that may share a commit to the disk."
+    )
+    token_rate: float = Field(
+        default=1_000.0,
+        gt=0.0,
+        description="Requests a second of one token; more are answered 429.",
+    )
+    token_requests: int = Field(
+        default=256, ge=1, description="Of one token at a time, streams of events aside."
+    )
+    token_streams: int = Field(
+        default=64, ge=1, description="Listeners to events of one token at a time."
     )
     gap_window_s: float = Field(
         default=2.0, ge=0.0, description="How long a scan waits for those before it."
@@ -143,7 +162,7 @@ class Settings(BaseSettings):
             read_config(value)
         return value
 
-    @field_validator("allow_origins", mode="before")
+    @field_validator("allow_origins", "allow_hosts", mode="before")
     @classmethod
     def _split(cls, value: object) -> object:
         if isinstance(value, str):

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 import typer
 from lineloom.cli.app import app as command_line
+from lineloom.wire import Readiness
 from lineloom_core.check import Checks
 from lineloom_core.checks import DOUBTED, JOINED, RECOGNISED, WIDE_LOOP
 from lineloom_core.mapping.config import MapperConfig
@@ -46,7 +47,8 @@ def commands(group: Any, *above: str) -> Iterator[str]:
 
 def metric_names() -> list[str]:
     metrics = Metrics()
-    metrics.watch(lambda: [], Durations, Histogram(), lambda: [])
+    ready = Readiness(takes_scans=True, maps=True, reasons=[])
+    metrics.watch(lambda: [], Durations, Histogram(), lambda: ready)
     suffix = {"counter": "_total", "info": "_info"}
     return [f"{f.name}{suffix.get(f.type, '')}" for f in metrics.registry.collect()]
 

@@ -138,7 +138,7 @@ def test_the_life_of_a_token(tmp_path: Path) -> None:
     ("arguments", "said"),
     [
         (["create", "--scope", "rule"], "no scope 'rule'; there are ingest, read, operate"),
-        (["create", "--scope", "read", "--site", "s"], "bound to a site"),
+        (["create", "--scope", "read", "--site", "s", "--robot", "r"], "bound to a robot"),
         (["create", "--scope", "ingest", "--robot", "r"], "name the site as well"),
         (["revoke", "0" * 12], "no token 000000000000"),
     ],

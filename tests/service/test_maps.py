@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import threading
+import time
+from collections import Counter
 from dataclasses import replace
 from typing import Any
 
@@ -66,12 +68,12 @@ class _Counted(MapStore):
         self.rendered: list[int] = []
         get = self._cache.get
 
-        async def counted(key: Any, render: Any) -> bytes:
+        async def counted(key: Any, render: Any, turn: asyncio.Lock | None = None) -> bytes:
             def render_once() -> str | bytes:
                 self.rendered.append(key[1][0])
                 return render()  # type: ignore[no-any-return]
 
-            return await get(key, render_once)
+            return await get(key, render_once, turn)
 
         self._cache.get = counted  # type: ignore[method-assign]
 
@@ -208,3 +210,25 @@ async def test_a_rendering_that_fails_is_tried_again() -> None:
     with pytest.raises(RuntimeError):
         await cache.get("k", fail)
     assert await cache.get("k", lambda: "yes") == b"yes"
+
+
+async def test_of_each_site_one_thing_is_drawn_at_a_time() -> None:
+    store, (view,) = MapStore(10**6), _views(1, 2)
+    under_way: Counter[int] = Counter()
+    most: Counter[int] = Counter()
+
+    async def draw(site: int, form: int) -> bytes:
+        def render() -> bytes:
+            under_way[site] += 1
+            most[site] = max(most[site], under_way[site])
+            most[0] = max(most[0], under_way.total())
+            time.sleep(0.02)
+            under_way[site] -= 1
+            return b"%d" % form
+
+        return await store.drawn(SiteRecord(site, "s", 0, 0, 0, {}), view, (form,), render)
+
+    drawn = await asyncio.gather(*(draw(site, form) for form in range(4) for site in (1, 2)))
+    assert drawn == [b"%d" % form for form in range(4) for _ in (1, 2)]
+    assert (most[1], most[2]) == (1, 1)
+    assert most[0] == 2  # sites do not wait for each other

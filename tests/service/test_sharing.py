@@ -20,6 +20,7 @@ from lineloom_service.engine import forwarding
 from lineloom_service.engine.local_engine import LocalEngine
 from lineloom_service.service import Service
 from lineloom_service.settings import Settings
+from lineloom_service.store import mapping_lease, postgres_database
 from lineloom_service.store.records import StoreError
 from sqlalchemy import text
 from sqlalchemy.ext.asyncio import create_async_engine
@@ -188,6 +189,51 @@ async def test_an_engine_whose_session_ends_gives_way(url: str, tmp_path: Path) 
         undisturbed = await _undisturbed(tmp_path, 50)
         assert await b.map() == undisturbed
         assert await a.map() == undisturbed
+
+
+async def test_a_standby_takes_over_from_a_mapper_that_does_not_renew_its_lease(
+    url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mapping_lease, "RENEW_S", 0.1)
+    monkeypatch.setattr(postgres_database, "LOOK_S", 0.1)
+    async with process(url, tmp_path) as a, process(url, tmp_path) as b:
+        await a.post(range(20))
+        before = await b.map()
+        await asyncio.sleep(1.5)  # a lease that is renewed stays
+        assert a.service.conductor.maps
+        assert (await b.get("/readyz"))["maps"]
+        renewing = _postgres(a)._renewing
+        assert renewing is not None
+        renewing.cancel()  # as in a process that was stopped
+        silent = "the process that maps (lineloom on "
+        told = await until(
+            lambda: b.get("/readyz?maps=true"), lambda found: silent in str(found["reasons"])
+        )
+        assert (told["takes_scans"], told["maps"]) == (True, False)
+        assert silent in (await b.get("/v1/sites/s"))["trouble"]
+        assert await b.get("/v1/sites/s/map") == before
+        await until(lambda: b.get("/readyz?maps=true"), lambda found: found["maps"])
+        assert b.service.conductor.maps
+        await b.post(range(20, 50))
+        undisturbed = await _undisturbed(tmp_path, 50)
+        assert await b.map() == undisturbed
+        assert await a.map() == undisturbed
+        assert (await b.get("/v1/sites/s"))["trouble"] is None
+
+
+async def test_that_nobody_maps_is_told(url: str, tmp_path: Path) -> None:
+    async with process(url, tmp_path, engine="off") as a:
+        await a.post(range(3))
+        nobody = "no process maps what is taken"
+        told = await until(lambda: a.get("/readyz"), lambda found: nobody in found["reasons"])
+        assert (told["takes_scans"], told["maps"]) == (True, False)
+        assert (await a.get("/v1/sites/s"))["trouble"] == nobody
+
+
+def _postgres(process: Process) -> postgres_database.PostgresDatabase:
+    database = process.service.store._database  # type: ignore[attr-defined]
+    assert isinstance(database, postgres_database.PostgresDatabase)
+    return database
 
 
 async def test_a_process_that_never_maps_leaves_it_to_the_others(url: str, tmp_path: Path) -> None:

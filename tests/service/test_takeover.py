@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import pytest
 from lineloom_service.engine.mapper import apply
 from lineloom_service.store.choice import database_at
 from lineloom_service.store.reads import read_feed, read_skips
@@ -77,6 +78,31 @@ async def test_a_standby_maps_on_when_the_process_that_mapped_is_killed(tmp_path
             await asyncio.gather(*driving)
             assert acknowledged[at_second] == 300  # whoever was left took scans all the while
             site = await _idle(ports[1])
+        entries = await _entries(tmp_path, url)
+    _expect_all_mapped(site, entries, acknowledged)
+
+
+@pytest.mark.long
+async def test_a_standby_maps_on_when_the_process_that_mapped_is_stopped(tmp_path: Path) -> None:
+    stream = ("s", "r")
+    acknowledged = {stream: 0}
+    ports = free_port(), free_port()
+    async with fresh_database(POSTGRESQL) as url:
+        assert url is not None
+        environment = {**SLOW, "SERVER_DATABASE_URL": url}
+        with (
+            server(tmp_path / "a", ports[0], **environment) as first,
+            server(tmp_path / "b", ports[1], **environment),
+        ):
+            driving = asyncio.create_task(drive(ports[1], [stream], acknowledged, goal=300))
+            while acknowledged[stream] < 100:
+                await asyncio.sleep(0.001)
+            first.send_signal(signal.SIGSTOP)
+            async with asyncio.timeout(15.0):
+                await driving
+                site = await _idle(ports[1])
+            first.send_signal(signal.SIGCONT)
+            assert await _idle(ports[0]) == site
         entries = await _entries(tmp_path, url)
     _expect_all_mapped(site, entries, acknowledged)
 

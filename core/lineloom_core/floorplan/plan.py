@@ -8,6 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 MOST_LINES = 200_000
+MOST_COORDINATE_M = 1e9
+"""Far beyond any grid of a country; an infinite length has no meaning."""
+
 _LEAST_LENGTH_M = 0.01
 
 
@@ -35,6 +38,8 @@ class FloorPlan:
         lines = lines[lengths(lines) >= _LEAST_LENGTH_M]
         if len(lines) == 0:
             raise FloorPlanError("holds no line of a centimetre or more")
+        if np.abs(lines).max() > MOST_COORDINATE_M:
+            raise FloorPlanError(f"lies {np.abs(lines).max():.3g} m away: is its unit right?")
         lines.setflags(write=False)
         return FloorPlan(lines)
 

@@ -20,6 +20,8 @@ DEFAULT_RESOLUTION_M = 0.05
 MOST_CELLS = 64_000_000
 
 _MARGIN_CELLS = 4
+_BAND_ROWS = 256
+"""Worked out at a time: shares of a whole grid at once took 30 bytes a cell."""
 _SHARE_OCCUPIED = 0.35
 """A cell where at least this share of the beams that met it ended is occupied."""
 
@@ -113,16 +115,19 @@ def rasterise(
     x, y, columns, rows = _frame(rays, lines, resolution, bbox)
     hits = np.zeros((rows, columns), dtype=np.uint16)
     passes = np.zeros_like(hits)
-    walls = np.zeros_like(hits)
     _kernels.cast(rays.poses, rays.sweeps, rays.starts, rays.ranges, x, y, resolution, hits, passes)
+    cells = np.empty((rows, columns), dtype=np.int8)
+    for band in (slice(i, i + _BAND_ROWS) for i in range(0, rows, _BAND_ROWS)):
+        met = hits[band].astype(np.float64) + passes[band]
+        cells[band] = np.where(met > 0, FREE, UNKNOWN)
+        cells[band][(hits[band] > 0) & (hits[band] >= _SHARE_OCCUPIED * met)] = OCCUPIED
+    walls = hits
+    walls[:] = 0
     for x1, y1, x2, y2 in lines.tolist():
         _kernels.walk(
             walls, (x1 - x) / resolution, (y1 - y) / resolution,
             (x2 - x) / resolution, (y2 - y) / resolution,
         )  # fmt: skip
-    met = hits.astype(np.float64) + passes
-    cells = np.where(met > 0, FREE, UNKNOWN).astype(np.int8)
-    cells[(hits > 0) & (hits >= _SHARE_OCCUPIED * met)] = OCCUPIED
     cells[walls > 0] = OCCUPIED
     return OccupancyGrid(cells, x, y, resolution)
 

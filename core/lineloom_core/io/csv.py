@@ -15,17 +15,21 @@ MAP_COLUMNS = (
 COLUMNS = ("session", "seq", "stamp", "component", "x", "y", "theta")
 
 
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+
+
 def write_trajectory(trajectory: TrajectoryView) -> str:
     """Return a header and one row per scan, in processing order (s, m, rad; full precision).
 
-    Component and pose of a scan that fitted nowhere are empty.
+    Component and pose of a scan that fitted nowhere are empty. A session whose name a spreadsheet
+    would take for a formula has an apostrophe before it.
     """
     target = io.StringIO()
     writer = csv.writer(target, lineterminator="\n")
     writer.writerow(COLUMNS)
     for session, seq, stamp, component, pose in trajectory.rows():
         figures = ("", "", "") if pose is None else map(repr, pose)
-        writer.writerow((session, seq, repr(stamp), component or "", *figures))
+        writer.writerow((_text(session), seq, repr(stamp), component or "", *figures))
     return target.getvalue()
 
 
@@ -45,3 +49,8 @@ def write_map(
             seen = (" ".join(w.robots), repr(w.first_seen), repr(w.last_seen))
             writer.writerow((w.id, w.component, *figures, w.support, *seen))
     return target.getvalue()
+
+
+def _text(value: str) -> str:
+    """Return a text that no spreadsheet takes for a formula."""
+    return f"'{value}" if value[:1] in _FORMULA else value

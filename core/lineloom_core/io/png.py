@@ -18,8 +18,14 @@ MAX_WIDTH_PX = 8000
 
 _OVERSAMPLING = 3
 _OVERSAMPLED_PIXELS_MAX = 60e6
+MOST_PIXELS = 40e6
+"""120 MB while it is drawn."""
 
 _ANCHORS = {"start": "ls", "middle": "ms", "end": "rs"}
+
+
+class PictureTooLargeError(ValueError):
+    """A page that would take more pixels than anybody can use; the text says what would do."""
 
 
 def write_map(
@@ -41,7 +47,12 @@ def write_map(
 
 def to_png(drawing: Drawing) -> bytes:
     """Return a drawing as a PNG file: drawn larger and averaged down, as Pillow draws no edges
-    smoothly by itself."""
+    smoothly by itself. Raises PictureTooLargeError."""
+    if drawing.width * drawing.height > MOST_PIXELS:
+        raise PictureTooLargeError(
+            f"the picture would have {drawing.width:.4g} x {drawing.height:.4g} pixels, more than "
+            f"{MOST_PIXELS:g}: ask for one component, or for svg, which takes none"
+        )
     width, height = round(drawing.width), round(drawing.height)
     factor = _OVERSAMPLING
     while factor > 1 and width * height * factor * factor > _OVERSAMPLED_PIXELS_MAX:

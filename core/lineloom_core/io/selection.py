@@ -21,6 +21,10 @@ BBox = tuple[float, float, float, float]
 """x_min, y_min, x_max, y_max [m] in the component's map frame."""
 
 
+MOST_COORDINATE_M = 1e6
+"""Of a bbox: no map is that large, and pages and grids are laid out by it."""
+
+
 class UnknownComponentError(KeyError):
     """The site has no such component (any more). The text says what it has."""
 
@@ -84,11 +88,13 @@ def select(
 
 
 def check_bbox(bbox: BBox | None) -> None:
-    """Raise ValueError for a bbox that is not finite or encloses nothing."""
+    """Raise ValueError for a bbox that is not finite, out of this world, or encloses nothing."""
     if bbox is None:
         return
     if len(bbox) != 4 or not all(math.isfinite(v) for v in bbox):
         raise ValueError("bbox must be four finite numbers: x_min, y_min, x_max, y_max")
+    if max(abs(v) for v in bbox) > MOST_COORDINATE_M:
+        raise ValueError(f"bbox must lie within {MOST_COORDINATE_M / 1000:g} km of the origin")
     if bbox[0] >= bbox[2] or bbox[1] >= bbox[3]:
         raise ValueError("bbox must have x_min < x_max and y_min < y_max")
 

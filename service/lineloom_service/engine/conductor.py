@@ -61,7 +61,7 @@ class Conductor:
         self._forwarding = Forwarding(store, self._ask_here)
         self._turns: asyncio.Task[None] | None = None
         self._forgetting: set[asyncio.Task[None]] = set()
-        self._mapping = self._was_standby = False
+        self._mapping = self._was_standby = self._beginning = False
 
     @property
     def maps(self) -> bool:
@@ -161,6 +161,8 @@ class Conductor:
 
     def trouble(self, site_id: int) -> str | None:
         """Return why a site is not mapped just now, None where all is well."""
+        if not self._mapping:
+            return self._nobody_maps()
         site = self._sites.get(site_id)
         return None if site is None else site.trouble
 
@@ -171,11 +173,19 @@ class Conductor:
     def not_ready(self) -> list[str]:
         """Return what is missing before scans are mapped and queries answer as before."""
         unseen = [f"the view of site {site} is being loaded" for site in self._views.waiting()]
-        if self._was_standby or not self._mapping:
-            return unseen  # taking over, it goes on answering
+        if not self._mapping:
+            nobody = self._nobody_maps()
+            return unseen if nobody is None else [nobody, *unseen]
+        if self._was_standby:  # taking over, it goes on answering
+            return self._engine.not_ready() + unseen
         found = (s.unfinished(self.published(i).position) for i, s in self._sites.items())
         reasons = [reason for reason in found if reason is not None]
         return self._engine.not_ready() + reasons + unseen
+
+    def _nobody_maps(self) -> str | None:
+        if self._beginning:
+            return "this process takes over from the one that mapped"
+        return self._store.mapper_trouble()
 
     async def _first_claim(self) -> Claim | None:
         try:
@@ -191,36 +201,49 @@ class Conductor:
     async def _take_turns(self, claim: Claim | None) -> None:
         """Map whenever no other process does."""
         while True:
-            if claim is None:
-                self._was_standby = True
-                try:
+            try:
+                if claim is None:
+                    self._was_standby = True
                     claim = await self._store.claim_mapping(wait=True)
-                except StoreError:
-                    await asyncio.sleep(_AGAIN_S)
-                    continue
-                _LOG.warning("no other engine has this database: this process maps from now on")
-                await self._begin()
-            await claim.lost.wait()
-            claim = None
-            _LOG.error("the database has ended our right to map; waiting for the next turn")
-            await self._end_sites()
-            self._sites.clear()
-            await self._engine.stop()
-            if self._recorder is not None:
-                self._recorder.release()
+                    _LOG.warning("no other engine has this database: this process maps from now on")
+                    self._beginning = True
+                    await self._begin()
+                await claim.lost.wait()
+                _LOG.error("the database has ended our right to map; waiting for the next turn")
+            except Exception:  # the database, mostly; without turns nobody would ever map again
+                _LOG.exception("this process does not map, trying again")
+                await asyncio.sleep(_AGAIN_S)
+            claim, self._beginning = None, False
+            await self._stand_by()
+
+    async def _stand_by(self) -> None:
+        """Map nothing: from now on that is another process's, or this one's again."""
+        await self._end_sites()
+        self._sites.clear()
+        await self._engine.stop()
+        if self._recorder is not None:
+            self._recorder.release()
 
     async def _begin(self) -> None:
         await self._engine.start()
         for record in await self._store.sites():
-            told = None if self._recorder is None else await self._recorder.told_of(record.id)
-            ordered = to_order(record, self._base, told)
-            if ordered is not None:
-                await self._store.write_as_engine(configure, record.name, ordered)
+            await self._order(record)
         records = await self._store.sites()
         self._mapping = True
         for record in records:
             if record.id not in self._sites:
                 self._sites[record.id] = HostedSite(record, self._means)
+
+    async def _order(self, record: SiteRecord) -> None:
+        """Have the log of a site say what its map is made with, as far as it is to be another."""
+        try:
+            told = None if self._recorder is None else await self._recorder.told_of(record.id)
+        except StoreError:  # one damaged site is no reason to map none
+            _LOG.exception("site %s: what was told of it cannot be read", record.name)
+            return
+        ordered = to_order(record, self._base, told)
+        if ordered is not None:
+            await self._store.write_as_engine(configure, record.name, ordered)
 
     async def _end_sites(self) -> list[SiteRunner]:
         self._mapping = False

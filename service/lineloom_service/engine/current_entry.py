@@ -15,6 +15,8 @@ BUSY = -2
 """Stands for a position while the site is worked on, and no entry is to blame for it."""
 
 _LAYOUT = struct.Struct("=qqd")
+_BEATS = struct.Struct("=q")
+_SIZE = _LAYOUT.size + _BEATS.size
 _NOTHING = (0, 0)
 
 
@@ -23,14 +25,19 @@ class CurrentEntry:
 
     def __init__(self, fd: int) -> None:
         self.fd = fd
-        self._memory = mmap.mmap(fd, _LAYOUT.size)
+        self._memory = mmap.mmap(fd, _SIZE)
 
     @classmethod
     def create(cls) -> CurrentEntry:
         """Make a new one; the file goes with the last process that has it open."""
         with tempfile.TemporaryFile() as file:
-            file.truncate(_LAYOUT.size)
-            return cls(os.dup(file.fileno()))
+            file.truncate(_SIZE)
+            fd = os.dup(file.fileno())
+        try:
+            return cls(fd)
+        except BaseException:
+            os.close(fd)
+            raise
 
     def mark(self, site: int, position: int) -> None:
         """Say what is being worked on now."""
@@ -49,6 +56,15 @@ class CurrentEntry:
         """How long it has been worked on; 0 where nothing is. The clock is the whole machine's."""
         site, position, since = _LAYOUT.unpack_from(self._memory, 0)
         return 0.0 if (site, position) == _NOTHING else time.monotonic() - float(since)
+
+    def beat(self) -> None:
+        """Say that the process is alive, whatever it is working on."""
+        _BEATS.pack_into(self._memory, _LAYOUT.size, self.beats() + 1)
+
+    def beats(self) -> int:
+        """Return how often it has said so."""
+        beats: int = _BEATS.unpack_from(self._memory, _LAYOUT.size)[0]
+        return beats
 
     def close(self) -> None:
         """Let go of the memory."""

@@ -20,7 +20,7 @@ from lineloom_service.engine.published import NOTHING, Published
 from lineloom_service.engine.site_runner import Pace, SiteRunner
 from lineloom_service.store.protocol import Store
 from lineloom_service.store.reads import read_last_events
-from lineloom_service.store.records import SiteRecord, StoreError
+from lineloom_service.store.records import SiteRecord
 from lineloom_service.store.snapshots import saved_position
 
 _LOG = logging.getLogger(__name__)
@@ -70,6 +70,7 @@ class HostedSite:
         self._next: SiteRunner | None = None
         self._former: Published | None = None
         """What is shown where nothing maps it any more: other code made it."""
+        self._unopened: str | None = None
         self._told = 0
         self._why = ""
         self._generation = 0
@@ -98,8 +99,20 @@ class HostedSite:
     @property
     def trouble(self) -> str | None:
         """Why the site is not mapped, shown or saved just now; None where all is well."""
-        runners = (self._served, self._next)
-        return "; ".join(r.trouble for r in runners if r is not None and r.trouble) or None
+        found = [
+            *self._own_troubles(),
+            *(self._means.engine.trouble(r.host) for r in self._runners),
+        ]
+        return "; ".join(dict.fromkeys(text for text in found if text)) or None
+
+    @property
+    def _runners(self) -> list[SiteRunner]:
+        return [runner for runner in (self._served, self._next) if runner is not None]
+
+    def _own_troubles(self) -> list[str]:
+        """What is wrong with this site, and not with the worker that others are on as well."""
+        found = (self._unopened, *(runner.trouble for runner in self._runners))
+        return [text for text in found if text]
 
     @property
     def remaking(self) -> Remaking | None:
@@ -115,7 +128,7 @@ class HostedSite:
         """
         runner = self._served
         # One site in trouble does not keep the others from being served.
-        if self.new or self.trouble is not None or self._former is not None:
+        if self.new or self._own_troubles() or self._former is not None:
             return None
         if runner is None:
             return f"site {self.name} is being opened"
@@ -181,10 +194,13 @@ class HostedSite:
         while True:
             try:
                 await self._find_served()
-            except StoreError:
-                _LOG.exception("site %s: cannot be opened, trying again", self.name)
+            except Exception as error:  # whatever it is: a site is never given up
+                if self._unopened is None:
+                    _LOG.exception("site %s: cannot be opened, trying again", self.name)
+                self._unopened = f"what was shown of it cannot be read: {error}"
                 await asyncio.sleep(_AGAIN_S)
             else:
+                self._unopened = None
                 break
         self._follow()
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import deque
-from collections.abc import AsyncIterator, Awaitable, Mapping, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from lineloom_core.codec import CodecError, encode
@@ -45,26 +46,13 @@ from lineloom_service.engine.protocol import (
     WorkerDiedError,
 )
 from lineloom_service.engine.questions import unpack_answer
+from lineloom_service.engine.signs_of_life import LOOK_S
 from lineloom_service.engine.worker_process import WorkerProcess
+from lineloom_service.engine.worker_slot import WorkerSlot
 from lineloom_service.observation.durations import Durations
 from lineloom_service.store.records import LogEntry
 
 _LOG = logging.getLogger(__name__)
-_RESPAWN_S = 0.1
-_WATCH_S = 2.0
-_RESPAWN_LIMIT_S = 10.0
-
-
-@dataclass(slots=True)
-class _Slot:
-    """A worker's place: one process after another. stillborn: in a row died before ready."""
-
-    number: int
-    process: WorkerProcess | None = None
-    ready: asyncio.Event = field(default_factory=asyncio.Event)
-    stillborn: int = 0
-    sites: set[int] = field(default_factory=set)
-    last_words: str = ""
 
 
 @dataclass(slots=True)
@@ -75,7 +63,7 @@ class _Site:
     on their way, and nothing else is taken.
     """
 
-    slot: _Slot
+    slot: WorkerSlot
     process: WorkerProcess | None = None
     run: int = 0
     gathering: bool = False
@@ -102,21 +90,20 @@ class LocalEngine:
         mapper: str = SITE_MAPPER,
         warm_up: str | None = WARM_UP,
     ) -> None:
-        self._mapper = mapper
         self._warm_up = warm_up
-        self._publish_every_s = publish_every_s
-        self._settle_after_s = settle_after_s
+        start = partial(_start_worker, mapper, warm_up, publish_every_s, settle_after_s)
         self._patience_s = patience_s
         self._watching: asyncio.Task[None] | None = None
         self._compilation = Compilation()
         self._compiling: asyncio.Task[None] | None = None
-        self._slots = [_Slot(number) for number in range(workers)]
+        self._slots = [
+            WorkerSlot(number, start, self._on_report, self._on_death) for number in range(workers)
+        ]
         self._sites: dict[int, _Site] = {}
         self._listeners: list[ViewListener] = []
         self._failure_listeners: list[FailureListener] = []
         self._death_listeners: list[DeathListener] = []
         self._durations = Durations()
-        self._stopping = False
 
     @property
     def pids(self) -> list[int]:
@@ -125,29 +112,22 @@ class LocalEngine:
 
     async def start(self) -> None:
         """Have kernels compiled where that has not been done, and spawn the workers."""
-        self._stopping = False
         self._compilation = Compilation()
-        for slot in self._slots:
-            slot.ready.clear()
         if self._warm_up == WARM_UP:
             self._compiling = asyncio.create_task(self._compile(), name="compile-kernels")
         else:
-            self._spawn_all()
+            self._open_slots()
         self._watching = asyncio.create_task(self._watch(), name="watch-workers")
 
     async def stop(self) -> None:
         """Kill the workers."""
-        self._stopping = True
         if self._watching is not None:
             self._watching.cancel()
         if self._compiling is not None:
             self._compiling.cancel()
             self._compilation.stop()
         for slot in self._slots:
-            if slot.process is not None:
-                slot.process.kill()
-                slot.process = None
-            slot.sites.clear()
+            slot.close()
         for site in self._sites.values():
             site.fail(WorkerDiedError(None, "the engine is stopping", killed=True))
         self._sites.clear()
@@ -165,13 +145,17 @@ class LocalEngine:
         self._death_listeners.append(listener)
 
     def not_ready(self) -> list[str]:
-        """Return which workers are not warm yet."""
+        """Return which workers are not warm yet, or not there."""
         return self._compilation.reasons() or [
-            f"worker {slot.number} is warming up"
-            + (f" again: {slot.last_words}" if slot.last_words else "")
+            slot.ailment or f"worker {slot.number} is warming up"
             for slot in self._slots
-            if not slot.ready.is_set()
+            if slot.ailment or not slot.ready.is_set()
         ]
+
+    def trouble(self, site: int) -> str | None:
+        """Return what is wrong with the site's worker."""
+        hosted = self._sites.get(site)
+        return None if hosted is None else hosted.slot.ailment
 
     def durations(self) -> Durations:
         """Return how long the workers' stages took so far."""
@@ -278,44 +262,29 @@ class LocalEngine:
         return answer
 
     async def _watch(self) -> None:
-        """A worker may hang and not die, in a solver or on a device: then it is ended."""
+        """A worker may hang and not die, in a solver or by a signal: then it is ended."""
         while True:
-            await asyncio.sleep(min(_WATCH_S, self._patience_s / 4))
+            await asyncio.sleep(LOOK_S)
             for slot in self._slots:
-                if slot.process is not None:
-                    slot.process.kill_if_hung(self._patience_s)
+                slot.look(self._patience_s)
 
     async def _compile(self) -> None:
-        await self._compilation.until_it_maps()
-        self._spawn_all()
+        try:
+            await self._compilation.until_it_maps()
+        except Exception:  # no threads, no disk: then each worker compiles what it needs
+            _LOG.exception("kernels were not compiled beforehand")
+        self._open_slots()
 
-    def _spawn_all(self) -> None:
+    def _open_slots(self) -> None:
         for slot in self._slots:
-            self._spawn(slot)
+            slot.open()
 
-    def _spawn(self, slot: _Slot) -> None:
-        if self._stopping or slot.process is not None:
-            return
-        process = slot.process = WorkerProcess(
-            f"lineloom-worker-{slot.number}",
-            self._mapper,
-            self._warm_up,
-            self._publish_every_s,
-            self._settle_after_s,
-            on_report=lambda report: self._on_report(slot, process, report),
-            on_death=lambda: self._on_death(slot, process),
-        )
-
-    def _on_report(self, slot: _Slot, process: WorkerProcess, report: Report) -> None:
-        if process is not slot.process:
-            return
-        if isinstance(report, Ready):
-            slot.stillborn = 0
-            slot.ready.set()
-            return
+    def _on_report(self, report: Report) -> None:
         if isinstance(report, Timed):
             self._durations.add(report.durations)
             return
+        if isinstance(report, Ready):
+            return  # its slot has seen to that
         hosted = self._sites.get(report.site)
         if hosted is None or hosted.run != report.run:
             return
@@ -332,14 +301,7 @@ class LocalEngine:
         elif hosted.awaited:
             _resolve(hosted.awaited.popleft(), report)
 
-    def _on_death(self, slot: _Slot, process: WorkerProcess) -> None:
-        if process is not slot.process:
-            return  # we ended it
-        slot.last_words = process.last_words
-        _LOG.warning("worker %d (process %s): %s", slot.number, process.pid, slot.last_words)
-        slot.stillborn = 0 if process.ready else slot.stillborn + 1
-        slot.ready.clear()
-        slot.process = None
+    def _on_death(self, slot: WorkerSlot, process: WorkerProcess) -> None:
         for number in slot.sites:
             site, blamed = self._sites[number], process.blamed
             position: int | None = None
@@ -350,8 +312,20 @@ class LocalEngine:
             site.fail(WorkerDiedError(position, slot.last_words, killed=process.killed))
             for told in self._death_listeners:
                 told(number)
-        pause = min(_RESPAWN_LIMIT_S, _RESPAWN_S * 2**slot.stillborn) if slot.stillborn else 0.0
-        asyncio.get_running_loop().call_later(pause, self._spawn, slot)
+
+
+def _start_worker(
+    mapper: str,
+    warm_up: str | None,
+    publish_every_s: float,
+    settle_after_s: float,
+    name: str,
+    on_report: Callable[[Report], None],
+    on_death: Callable[[], None],
+) -> WorkerProcess:
+    return WorkerProcess(
+        name, mapper, warm_up, publish_every_s, settle_after_s, on_report, on_death
+    )
 
 
 async def _answer(question: str, answered: Awaitable[bytes]) -> Any:

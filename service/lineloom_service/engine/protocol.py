@@ -17,9 +17,10 @@ ViewListener = Callable[[int, int, SiteView], None]
 
 
 FailureListener = Callable[[int, int, str], None]
+"""Called on the event loop with a site, its position and why there is no view after the entry."""
+
 DeathListener = Callable[[int], None]
 """Called with a site whose mapper is gone and has to be started again."""
-"""Called on the event loop with a site, its position and why there is no view after the entry."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +59,7 @@ class WorkerDiedError(Exception):
     """The process that hosted the site is gone. The site has to be started again.
 
     position: the site's entry that it was working on, None where it was not this site's turn.
-    killed: by SIGKILL, so somebody else (an operator, the kernel out of memory) ended it.
+    killed: by a signal of somebody else (an operator, the kernel out of memory).
     """
 
     def __init__(self, position: int | None, reason: str, *, killed: bool) -> None:
@@ -98,6 +99,10 @@ class Engine(Protocol):
 
     def not_ready(self) -> list[str]:
         """Return what is missing before mappers can run; empty when nothing is."""
+        ...
+
+    def trouble(self, site: int) -> str | None:
+        """Return what is wrong with the place that hosts a site, None where all is well."""
         ...
 
     def durations(self) -> Durations:

@@ -167,6 +167,12 @@ class SiteRunner:
                     _LOG.exception("site %s: its log cannot be read, trying again", self.name)
                 self._troubles["log"] = f"its log cannot be read: {error}"
                 await asyncio.sleep(_AGAIN_S)
+            except Exception as error:  # no threads, no memory: a site is never given up
+                if "unforeseen" not in self._troubles:
+                    _LOG.exception("site %s: an unexpected error, trying again", self.name)
+                kind = type(error).__name__
+                self._troubles["unforeseen"] = f"it cannot be mapped: {kind}: {error}"
+                await asyncio.sleep(_AGAIN_S)
 
     async def save(self) -> None:
         """Save a snapshot if anything was mapped since the last one. Nothing may be under way.
@@ -217,6 +223,7 @@ class SiteRunner:
             self._recorded_settled = await self._recorder.recorded_settled(self.site)
         await self._resume()
         self._troubles.pop("start", None)
+        self._troubles.pop("unforeseen", None)
         while True:
             if self._died:
                 raise WorkerDiedError(None, "its mapper died", killed=False)

@@ -53,6 +53,7 @@ from lineloom_service.store.records import LogEntry
 _LOG = logging.getLogger(__name__)
 
 _NICENESS = 5
+_BEAT_S = 0.5
 _COMPILED = "LINELOOM_WORKER_HAS_COMPILED"
 _CAUGHT_UP_PAUSE_S = 0.05
 _PUBLISHING_SHARE = 0.1
@@ -331,6 +332,8 @@ def run_worker(
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     threading.Thread(target=_end_with_service, args=(life,), daemon=True).start()
+    entry = CurrentEntry(current)
+    threading.Thread(target=_beat, args=(entry,), daemon=True).start()
     with contextlib.suppress(OSError):
         os.nice(_NICENESS - os.nice(0))  # answers go before mapping
     configure_from_environment()
@@ -340,7 +343,7 @@ def run_worker(
     connection: Connection[Any, Any] = Connection(pipe)
     # The service has closed its end: nobody is left to report to.
     with contextlib.suppress(BrokenPipeError, ConnectionResetError):
-        worker = Worker(connection, CurrentEntry(current), factory, publish_every_s, settle_after_s)
+        worker = Worker(connection, entry, factory, publish_every_s, settle_after_s)
         worker.serve()
 
 
@@ -349,6 +352,12 @@ def _begin_again() -> None:
     if _COMPILED not in os.environ:
         os.environ[_COMPILED] = "1"
         os.execv(sys.executable, sys.orig_argv)
+
+
+def _beat(entry: CurrentEntry) -> None:
+    while True:
+        entry.beat()
+        time.sleep(_BEAT_S)
 
 
 def _end_with_service(life: int) -> None:

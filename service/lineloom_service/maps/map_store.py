@@ -35,6 +35,7 @@ class MapStore:
         self._cache = RenderCache(limit)
         self._histories: dict[int, LineHistory] = {}
         self._asked: dict[int, SiteRecord] = {}
+        self._turns: dict[int, asyncio.Lock] = {}
         self._preparing: set[asyncio.Task[bytes]] = set()
 
     def prepare(self, site_id: int, view: SiteView) -> None:
@@ -73,7 +74,19 @@ class MapStore:
         """Return what `render` makes of the view; `form` names all that tells it from others."""
         return await self._cache.get((site.id, view.stage, *form), render)
 
+    async def drawn(
+        self,
+        site: SiteRecord,
+        view: SiteView,
+        form: tuple[object, ...],
+        render: Callable[[], str | bytes],
+    ) -> bytes:
+        """Return the same of what takes much room while it is made: of each site one at a time."""
+        turn = self._turns.setdefault(site.id, asyncio.Lock())
+        return await self._cache.get((site.id, view.stage, *form), render, turn)
+
     def forget_site(self, site_id: int) -> None:
         """A site was deleted."""
         self._histories.pop(site_id, None)
         self._asked.pop(site_id, None)
+        self._turns.pop(site_id, None)

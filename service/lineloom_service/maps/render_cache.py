@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
+from contextlib import AbstractAsyncContextManager, nullcontext
 
 
 class RenderCache:
@@ -24,22 +25,33 @@ class RenderCache:
         """Bytes kept."""
         return self._size
 
-    async def get(self, key: Hashable, render: Callable[[], str | bytes]) -> bytes:
-        """Return what `render` returns, or has returned for the same key."""
+    async def get(
+        self, key: Hashable, render: Callable[[], str | bytes], turn: asyncio.Lock | None = None
+    ) -> bytes:
+        """Return what `render` returns, or has returned for the same key.
+
+        turn: held while it renders, where that is not to happen beside something else.
+        """
         ready = self._ready.get(key)
         if ready is not None:
             self._ready.move_to_end(key)
             return ready
         task = self._under_way.get(key)
         if task is None:
-            task = asyncio.create_task(self._render(key, render))
+            task = asyncio.create_task(self._render(key, render, turn or nullcontext()))
             self._under_way[key] = task
         # Who goes away takes nothing from the others who wait.
         return await asyncio.shield(task)
 
-    async def _render(self, key: Hashable, render: Callable[[], str | bytes]) -> bytes:
+    async def _render(
+        self,
+        key: Hashable,
+        render: Callable[[], str | bytes],
+        turn: AbstractAsyncContextManager[None],
+    ) -> bytes:
         try:
-            content = await asyncio.to_thread(render)
+            async with turn:
+                content = await asyncio.to_thread(render)
         finally:
             del self._under_way[key]
         data = content.encode() if isinstance(content, str) else content

@@ -7,6 +7,7 @@ from collections import Counter as Tally
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+from lineloom.wire import Readiness
 from lineloom_core.mapping.answers.site_view import SiteView
 from prometheus_client import CollectorRegistry, Counter, Gauge, Info
 from prometheus_client import Histogram as PrometheusHistogram
@@ -22,13 +23,14 @@ _HTTP_BOUNDS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 
 @dataclass(frozen=True, slots=True)
 class SiteFigures:
     """A site now. pending: log entries not yet in the published map. remaking: not yet in the
-    one that is made to be shown instead."""
+    one that is made to be shown instead. troubled: `trouble` says something."""
 
     name: str
     pending: int
     held: int
     view: SiteView
     remaking: int = 0
+    troubled: bool = False
 
 
 class Metrics:
@@ -96,10 +98,10 @@ class Metrics:
         sites: Callable[[], Sequence[SiteFigures]],
         durations: Callable[[], Durations],
         latency: Histogram,
-        not_ready: Callable[[], Sequence[str]],
+        readiness: Callable[[], Readiness],
     ) -> None:
         """Have figures of the state looked up whenever somebody asks for the metrics."""
-        self.registry.register(_State(sites, durations, latency, not_ready))
+        self.registry.register(_State(sites, durations, latency, readiness))
 
 
 class _State(Collector):
@@ -110,12 +112,12 @@ class _State(Collector):
         sites: Callable[[], Sequence[SiteFigures]],
         durations: Callable[[], Durations],
         latency: Histogram,
-        not_ready: Callable[[], Sequence[str]],
+        readiness: Callable[[], Readiness],
     ) -> None:
         self._sites = sites
         self._durations = durations
         self._latency = latency
-        self._not_ready = not_ready
+        self._readiness = readiness
 
     def describe(self) -> list[GaugeMetricFamily]:
         """Say nothing while being registered: nothing has started yet."""
@@ -123,9 +125,14 @@ class _State(Collector):
 
     def collect(self) -> Iterator[GaugeMetricFamily | HistogramMetricFamily]:
         """Yield every family."""
-        ready = float(not self._not_ready())
+        state = self._readiness()
         yield GaugeMetricFamily(
-            "lineloom_ready", "1 where /readyz?maps=true says yes.", value=ready
+            "lineloom_takes_scans", "1 where /readyz says yes.", value=float(state.takes_scans)
+        )
+        yield GaugeMetricFamily(
+            "lineloom_ready",
+            "1 where /readyz?maps=true says yes.",
+            value=float(state.takes_scans and state.maps),
         )
         yield from _site_gauges(self._sites())
         yield HistogramMetricFamily(
@@ -154,6 +161,7 @@ def _site_gauges(sites: Sequence[SiteFigures]) -> Iterator[GaugeMetricFamily]:
             "Log entries not yet in the map that is made anew; 0 where none is.",
             lambda s: s.remaking,
         ),
+        ("trouble", "1 where `trouble` of the site says what is wrong.", lambda s: s.troubled),
         ("version", "Version of the published map.", lambda s: s.view.version),
         ("components", "Components.", lambda s: len(s.view.components)),
         ("keyframes", "Keyframes.", lambda s: len(s.view.keyframes)),

@@ -12,6 +12,7 @@ from lineloom import wire
 from lineloom_core.io.selection import check_bbox
 from lineloom_core.mapping.answers.site_view import SiteView
 from pydantic import ValidationError
+from starlette.datastructures import URL
 
 from lineloom_service.answers import answer, matches
 from lineloom_service.asking import settled_view
@@ -34,7 +35,7 @@ from lineloom_service.store.records import SiteRecord
 
 router = APIRouter(tags=["exports"])
 
-_FOREVER = "public, max-age=31536000, immutable"
+_FOREVER = "max-age=31536000, immutable"
 
 
 @router.post(
@@ -91,7 +92,8 @@ async def get_export(
     etag = f'"{file.sha256}"'
     headers = {
         "ETag": etag,
-        "Cache-Control": _FOREVER,
+        # What takes a token is not for a cache that answers whoever asks.
+        "Cache-Control": f"{'private' if service.guard.protects else 'public'}, {_FOREVER}",
         # RFC 9530
         "Repr-Digest": f"sha-256=:{base64.b64encode(bytes.fromhex(file.sha256)).decode()}:",
         "Content-Disposition": f'attachment; filename="{_filename(site, file)}"',
@@ -146,7 +148,7 @@ def _file(view: SiteView, wanted: wire.ExportRequest, content: bytes) -> FileRec
 
 def _export(request: Request, site: SiteRecord, file: FileRecord) -> wire.Export:
     about = json.loads(file.about)
-    url = str(request.url_for("get_export", site=site.name, export=file.name))
+    url = _address(request, request.url_for("get_export", site=site.name, export=file.name))
     component = about["component"]
     return wire.Export(
         id=file.name,
@@ -167,6 +169,17 @@ def _export(request: Request, site: SiteRecord, file: FileRecord) -> wire.Export
             mapHash=file.sha256,
         ),
     )
+
+
+def _address(request: Request, url: URL) -> str:
+    """Return where a file is, under a name that the service has: anybody may write any `Host`."""
+    service: Service = request.app.state.service
+    if service.settings.public_url is not None:
+        return service.settings.public_url.rstrip("/") + url.path
+    host, port = request.scope.get("server") or ("localhost", None)
+    if service.hosts.knows(request.headers.get("host", ""), host):
+        return str(url)
+    return str(url.replace(hostname=host, port=port))
 
 
 def _filename(site: SiteRecord, file: FileRecord) -> str:

@@ -12,8 +12,8 @@ from lineloom_core.floorplan.plan import FloorPlanError, lengths
 from lineloom_core.floorplan.registration import Registration
 from lineloom_core.geometry import Pose
 from lineloom_core.io.floorplan_drawing import draw_differences
-from lineloom_core.io.floorplan_files import PlanFormat, read_plan
-from lineloom_core.io.png import to_png
+from lineloom_core.io.floorplan_files import PlanFormat
+from lineloom_core.io.png import PictureTooLargeError, to_png
 from lineloom_core.io.svg import to_svg
 from lineloom_core.mapping.answers.site_view import SiteView
 
@@ -66,7 +66,7 @@ async def put_floorplan(
         raise ProblemError(UNSUPPORTED_TYPE, detail, headers={"Accept": ", ".join(_FORMATS)})
     content = await read_raw(request, service.settings)
     try:
-        plan = await asyncio.to_thread(read_plan, content, _FORMATS[content_type])
+        plan = await service.plans.read(content, _FORMATS[content_type])
     except FloorPlanError as error:
         raise ProblemError(INVALID_BODY, f"the floor plan: {error}") from None
     stored = await service.floorplans.put(site, plan)
@@ -113,7 +113,10 @@ async def get_differences(
     drawing = await asyncio.to_thread(draw_differences, found)
     if format == "svg":
         return Response(to_svg(drawing), media_type="image/svg+xml")
-    return Response(await asyncio.to_thread(to_png, drawing), media_type="image/png")
+    try:
+        return Response(await asyncio.to_thread(to_png, drawing), media_type="image/png")
+    except PictureTooLargeError as error:
+        raise ProblemError(INVALID_PARAMETER, f"format: {error}") from None
 
 
 async def _plan(service: Service, site: SiteRecord) -> StoredPlan:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Request, Response
 from lineloom import wire
 
 from lineloom_service.answers import answer
@@ -16,9 +16,10 @@ router = APIRouter(tags=["sites"])
 
 
 @router.get("/v1/sites", response_model=wire.SiteList)
-async def list_sites(service: ServiceDep) -> Response:
-    """Return all sites."""
-    records = await service.store.sites()
+async def list_sites(request: Request, service: ServiceDep) -> Response:
+    """Return all sites; with a token of one site, that one."""
+    only = request.state.only_site
+    records = [site for site in await service.store.sites() if only in (None, site.name)]
     sites = [await _site(record, service) for record in records]
     return answer(wire.SiteList(sites=sites))
 
@@ -27,7 +28,8 @@ async def list_sites(service: ServiceDep) -> Response:
 async def get_site(site: KnownSite, service: ServiceDep) -> Response:
     """Return how a site is doing. `idle`: all that was accepted is in the map.
 
-    `trouble`: why it is not mapped just now, such as a log that cannot be read; else null.
+    `trouble`: what is wrong just now, such as a log that cannot be read, a worker that hangs or a
+    disk that is full; else null.
     """
     return answer(await _site(site, service))
 
@@ -47,6 +49,6 @@ async def _site(record: SiteRecord, service: Service) -> wire.Site:
     return to_site(
         record,
         conductor.published(record.id),
-        conductor.trouble(record.id),
+        service.trouble(record.id),
         to_remaking(await conductor.remaking_anywhere(record)),
     )

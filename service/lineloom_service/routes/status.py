@@ -33,6 +33,7 @@ async def readyz(
     service: ServiceDep, maps: Annotated[bool, Query(description=_MAPS)] = False
 ) -> Response:
     """Scans are taken, and with `maps=true` mapped as well; 503 says what is missing."""
+    await service.look_at_storage()
     state = service.readiness()
     if state.takes_scans and (state.maps or not maps):
         return answer(state)

@@ -60,10 +60,17 @@ class Guard:
                 await self._refreshing
 
     async def admit(
-        self, authorization: str | None, scope: Scope, site: str | None, robot: str | None
-    ) -> str | None:
-        """Return the id of the token that allows this, None where none is needed.
+        self,
+        authorization: str | None,
+        scope: Scope,
+        site: str | None,
+        robot: str | None,
+        *,
+        anywhere: bool = False,
+    ) -> TokenRecord | None:
+        """Return the token that allows this, None where none is needed.
 
+        anywhere: what is asked is about no site, or tells of the token's own only.
         Raises ProblemError: 401 without a good token, 403 where it is not good for this.
         """
         if not self.protects:
@@ -73,9 +80,9 @@ class Guard:
             have = ", ".join(record.scopes)
             raise _forbidden(f"this takes scope {scope!r}; the token has {have}", scope)
         for what, bound, wanted in (("site", record.site, site), ("robot", record.robot, robot)):
-            if bound is not None and bound != wanted:
+            if bound is not None and bound != wanted and not (anywhere and wanted is None):
                 raise _forbidden(f"the token is for {what} {bound!r} only", scope)
-        return record.id
+        return record
 
     def still_good(self, token_id: str | None) -> bool:
         """Whether what was admitted may go on: for answers that take long."""

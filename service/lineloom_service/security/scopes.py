@@ -18,6 +18,10 @@ _BY_ROUTE: dict[tuple[str, str], Scope] = {
 }
 
 
+ABOUT_NO_SITE = ("/v1/match", "/v1/map-formats", "/v1/sites")
+"""Routes for tokens of one site as well; the list of sites then has that one only."""
+
+
 def scope_of(method: str, path: str) -> Scope:
     """Return the scope for a method and a route's path as declared, e.g. `/v1/sites/{site}`."""
     named = _BY_ROUTE.get((method, path))

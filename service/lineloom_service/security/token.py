@@ -22,7 +22,7 @@ _FORM = re.compile(r"lineloom_([0-9a-f]{12})_([A-Za-z0-9_-]{43})")
 
 @dataclass(frozen=True, slots=True)
 class TokenRecord:
-    """What is stored of a token. site, robot: where `ingest` is bound to them.
+    """What is stored of a token. site: where it is bound to one. robot: where `ingest` is.
 
     created, revoked: seconds since 1970. note: the operator's own words.
     """

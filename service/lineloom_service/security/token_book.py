@@ -25,8 +25,8 @@ def create_token(
 ) -> tuple[str, TokenRecord]:
     """Make a token and return it: the only time that it can be seen. Raises TokenRefusedError."""
     wanted = _check_scopes(scopes)
-    if (site or robot) and wanted != ("ingest",):
-        raise TokenRefusedError("only a token whose one scope is ingest can be bound to a site")
+    if robot and wanted != ("ingest",):
+        raise TokenRefusedError("only a token whose one scope is ingest can be bound to a robot")
     if robot and not site:
         raise TokenRefusedError("a robot is named within a site: name the site as well")
     token, name, digest = new_token()

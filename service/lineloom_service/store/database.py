@@ -57,6 +57,14 @@ class Database(Protocol):
         """Have `listener` told of `notify`; of an empty text where notices may have been lost."""
         ...
 
+    async def check(self) -> None:
+        """Look whether there is room for more where the tables are. Raises StoreError, OSError."""
+        ...
+
+    def mapper_trouble(self) -> str | None:
+        """Return why nobody seems to map what is here; None where somebody does."""
+        ...
+
     async def claim(self, *, wait: bool) -> Claim:
         """Become the only one who maps. Raises ClaimedError where another is and we do not wait."""
         ...

@@ -18,6 +18,7 @@ from lineloom_service.store.database import Database, notify
 from lineloom_service.store.ledger import Ledger
 from lineloom_service.store.protocol import CommitListener
 from lineloom_service.store.records import BacklogFullError, SiteRecord, StoreError
+from lineloom_service.store.storage_trial import told_plainly
 from lineloom_service.store.transaction import Transaction
 
 T = TypeVar("T")
@@ -41,12 +42,24 @@ class _Job:
 
 @dataclass(slots=True)
 class _Outcome:
-    """What a commit did: each job's result or refusal, the sites that are not as before."""
+    """What a commit did: each job's result or refusal, the sites that are not as before.
+
+    failed: why some or all of it is not on the disk.
+    """
 
     results: list[Any] = field(default_factory=list)
     records: list[SiteRecord] = field(default_factory=list)
     deadline: float | None = None
     revision: int = -1
+    failed: Exception | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A commit that failed. at: when, monotonic [s]."""
+
+    at: float
+    why: str
 
 
 class GroupCommit:
@@ -70,6 +83,8 @@ class GroupCommit:
         self._task: asyncio.Task[None] | None = None
         self.revision = -1
         """The clock's, up to which the listener has been told of everything."""
+        self.failure: Failure | None = None
+        """Of the last commit that had something to write; None where it went well."""
 
     async def start(self) -> None:
         """Read the ledger, telling the listener of all sites, and start."""
@@ -115,7 +130,11 @@ class GroupCommit:
                 _LOG.exception("nothing was committed")
                 self._deadline = time.monotonic() + _RETRY_S
                 failure = StoreError(f"the storage failed: {type(error).__name__}")
-                outcome = _Outcome([failure] * len(jobs), [], self._deadline)
+                outcome = _Outcome([failure] * len(jobs), [], self._deadline, failed=error)
+            if outcome.failed is not None:
+                self.failure = Failure(time.monotonic(), told_plainly(outcome.failed))
+            elif any(job.action is not None for job in jobs):
+                self.failure = None
             self._deadline = outcome.deadline
             self._tell(outcome)
             for job, result in zip(jobs, outcome.results, strict=True):
@@ -135,7 +154,10 @@ class GroupCommit:
 
     def _tell(self, outcome: _Outcome) -> None:
         for record in outcome.records:
-            self._listener(record)
+            try:
+                self._listener(record)
+            except Exception:  # what is committed is committed, and the next ones wait
+                _LOG.exception("site %s: a commit was not followed", record.name)
         self.revision = max(self.revision, outcome.revision)
 
     async def _commit(self, actions: list[Action[Any] | None]) -> _Outcome:
@@ -153,6 +175,7 @@ class GroupCommit:
             except Exception as error:
                 self._distrust_ledger()
                 outcome.results.append(StoreError(f"the storage failed: {type(error).__name__}"))
+                outcome.failed = error
             else:
                 outcome.results += alone.results
                 outcome.records += alone.records

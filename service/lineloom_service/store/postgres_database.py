@@ -13,6 +13,13 @@ from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, create_async_engine
 
 from lineloom_service.store.database import Claim, ClaimedError, NoticeListener, Work
+from lineloom_service.store.mapping_lease import (
+    LOOK_S,
+    MAPPING_LOCK,
+    HolderWatch,
+    look_for_holder,
+    renew,
+)
 from lineloom_service.store.migrate import migrate
 from lineloom_service.store.records import StoreError
 
@@ -20,18 +27,12 @@ T = TypeVar("T")
 
 _LOG = logging.getLogger(__name__)
 
-_UPGRADE_LOCK, _MAPPING_LOCK = 0x4C4C_0001, 0x4C4C_0002
-"""Advisory locks; they count within one database and end with the session that holds them."""
+_UPGRADE_LOCK = 0x4C4C_0001
+"""An advisory lock; it counts within one database and ends with the transaction."""
 
 _POOL_SIZE = 8
 _AGAIN_S = 1.0
 _LOST = (SQLAlchemyError, OSError)
-
-_WHO_MAPS = text(
-    "SELECT application_name FROM pg_stat_activity JOIN pg_locks USING (pid)"
-    f" WHERE locktype = 'advisory' AND granted AND objid = {_MAPPING_LOCK}"
-    " AND database = (SELECT oid FROM pg_database WHERE datname = current_database())"
-)
 
 
 class PostgresDatabase:
@@ -51,6 +52,10 @@ class PostgresDatabase:
         self._listeners: list[NoticeListener] = []
         self._listening: asyncio.Task[None] | None = None
         self._holding: AsyncConnection | None = None
+        self._renewing: asyncio.Task[None] | None = None
+        self._watching: asyncio.Task[None] | None = None
+        self._holder = HolderWatch()
+        self._waits = False
 
     async def open(self) -> None:
         """Upgrade the tables, one process at a time, and listen."""
@@ -61,12 +66,14 @@ class PostgresDatabase:
             where = self._engine.url.render_as_string(hide_password=True)
             raise StoreError(f"cannot use the database {where}: {_first_line(error)}") from error
         self._listening = asyncio.create_task(self._listen(), name="lineloom-listen")
+        self._watching = asyncio.create_task(self._watch_holder(), name="lineloom-watch-lease")
 
     async def close(self) -> None:
         """Disconnect; the right to map, if it was ours, is free."""
-        if self._listening is not None:
-            self._listening.cancel()
-            await asyncio.gather(self._listening, return_exceptions=True)
+        tasks = [task for task in (self._listening, self._watching) if task is not None]
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
         await self._let_go()
         await self._engine.dispose()
 
@@ -86,27 +93,39 @@ class PostgresDatabase:
 
     async def claim(self, *, wait: bool) -> Claim:
         """Take the lock of the one who maps, in a session that holds it from then on."""
-        while True:
-            try:
-                return await self._claim(wait)
-            except _LOST as error:
-                if not wait:
-                    raise StoreError(f"the storage failed: {_first_line(error)}") from error
-                _LOG.warning("the database is out of reach: %s", _first_line(error))
-                await asyncio.sleep(_AGAIN_S)
+        self._waits = wait
+        try:
+            while True:
+                try:
+                    return await self._claim(wait)
+                except _LOST as error:
+                    if not wait:
+                        raise StoreError(f"the storage failed: {_first_line(error)}") from error
+                    _LOG.warning("the database is out of reach: %s", _first_line(error))
+                    await asyncio.sleep(_AGAIN_S)
+        finally:
+            self._waits = False
+
+    def mapper_trouble(self) -> str | None:
+        """Return why nobody seems to map, as the last look found it; not for the one who maps."""
+        return self._holder.trouble
+
+    async def check(self) -> None:
+        """Its place is the server's business."""
 
     async def _claim(self, wait: bool) -> Claim:
         await self._let_go()
         session = await self._own_session()
         try:
             if wait:
-                await session.execute(text(f"SELECT pg_advisory_lock({_MAPPING_LOCK})"))
+                await session.execute(text(f"SELECT pg_advisory_lock({MAPPING_LOCK})"))
             else:
-                tried = await session.execute(text(f"SELECT pg_try_advisory_lock({_MAPPING_LOCK})"))
+                tried = await session.execute(text(f"SELECT pg_try_advisory_lock({MAPPING_LOCK})"))
                 if not tried.scalar_one():
-                    holder = (await session.execute(_WHO_MAPS)).scalar() or "unknown"
+                    holder = await look_for_holder(session)
+                    name = "unknown" if holder is None else holder.name
                     raise ClaimedError(
-                        f"another mapping engine ({holder}) has this database; there can be one"
+                        f"another mapping engine ({name}) has this database; there can be one"
                     )
         except BaseException:
             await _end(session)
@@ -114,12 +133,30 @@ class PostgresDatabase:
         claim = Claim()
         await _on_end(session, claim.lost)
         self._holding = session
+        self._renewing = asyncio.create_task(renew(session, claim), name="lineloom-renew-lease")
         return claim
 
     async def _let_go(self) -> None:
         session, self._holding = self._holding, None
+        if self._renewing is not None:
+            self._renewing.cancel()
+            await asyncio.gather(self._renewing, return_exceptions=True)
         if session is not None:
             await _end(session)
+
+    async def _watch_holder(self) -> None:
+        """Know who maps; while this process waits for its turn, end one that is silent."""
+        while True:
+            await asyncio.sleep(LOOK_S)
+            if self._holding is not None:
+                continue
+            try:
+                async with self._engine.connect() as session:
+                    self._holder.see(await look_for_holder(session))
+                    if self._waits:
+                        await self._holder.end_silent(session)
+            except Exception as error:  # not to be reached: others tell
+                _LOG.debug("who maps is not known: %s", _first_line(error))
 
     async def _own_session(self) -> AsyncConnection:
         """Return a connection that stays out of the pool, and out of any transaction."""

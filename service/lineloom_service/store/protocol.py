@@ -105,6 +105,14 @@ class Store(Protocol):
         """Write such a thing that is the mapping process's alone."""
         ...
 
+    async def check(self) -> str | None:
+        """Try whether scans can be taken; return why not. The last commits count as well."""
+        ...
+
+    def mapper_trouble(self) -> str | None:
+        """Return why no other process seems to map; None where one does, or this one is to."""
+        ...
+
     async def claim_mapping(self, *, wait: bool) -> Claim:
         """Become the one process that maps.
 

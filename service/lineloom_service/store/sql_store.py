@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import time
 from collections.abc import Awaitable, Callable
 from typing import Concatenate, ParamSpec, TypeVar
 
@@ -18,12 +19,18 @@ from lineloom_service.store.ledger import Ledger
 from lineloom_service.store.protocol import NEWS, CommitListener, NewsListener
 from lineloom_service.store.reads import read_revision, read_term
 from lineloom_service.store.records import SiteRecord, StoreError
+from lineloom_service.store.storage_trial import told_plainly, try_storage
 from lineloom_service.store.transaction import Transaction
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
 _LOG = logging.getLogger(__name__)
+
+_FAILS_ON_S = 10.0
+"""A commit that failed counts for so long, unless one has succeeded since."""
+
+_TRIAL_S = 5.0
 
 
 class SqlStore:
@@ -128,6 +135,25 @@ class SqlStore:
             return work(connection, *args, **kwargs)
 
         return await self.write_apart(guarded)
+
+    async def check(self) -> str | None:
+        """Try whether scans can be taken."""
+        failed = self._writer.failure
+        if failed is not None and time.monotonic() - failed.at < _FAILS_ON_S:
+            return f"the storage failed: {failed.why}"
+        try:
+            async with asyncio.timeout(_TRIAL_S):
+                await self._database.check()
+                await self._database.write(try_storage)
+        except TimeoutError:
+            return f"the storage does not answer within {_TRIAL_S:g} s"
+        except Exception as error:  # whatever it is: nothing can be taken
+            return f"the storage failed: {told_plainly(error)}"
+        return None
+
+    def mapper_trouble(self) -> str | None:
+        """Return why no other process seems to map."""
+        return self._database.mapper_trouble()
 
     async def claim_mapping(self, *, wait: bool) -> Claim:
         """Become the process that maps."""

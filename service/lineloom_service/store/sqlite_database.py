@@ -13,6 +13,7 @@ from lineloom_service.store.database import Claim, NoticeListener, Work
 from lineloom_service.store.directory_lock import DirectoryLock
 from lineloom_service.store.records import StoreError
 from lineloom_service.store.sqlite_engine import reading, sqlite_engine
+from lineloom_service.store.sqlite_place import SqlitePlace
 from lineloom_service.store.sqlite_upgrade import upgrade_file
 
 T = TypeVar("T")
@@ -30,6 +31,7 @@ class SqliteDatabase:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._lock = DirectoryLock(path.parent)
+        self._place = SqlitePlace(path)
         self._engine: Engine | None = None
         self._writer: ThreadPoolExecutor | None = None
         self._readers: ThreadPoolExecutor | None = None
@@ -39,6 +41,7 @@ class SqliteDatabase:
         self._lock.acquire()
         try:
             await asyncio.to_thread(upgrade_file, self._path)
+            self._place.remember()
             self._engine = sqlite_engine(self._path)
         except BaseException:
             self._lock.release()
@@ -77,6 +80,14 @@ class SqliteDatabase:
 
     def listen(self, listener: NoticeListener) -> None:
         """Nobody else is there to tell anything."""
+
+    async def check(self) -> None:
+        """Look whether the file is still there, and whether there is room beside it."""
+        await asyncio.get_running_loop().run_in_executor(self._readers, self._place.check)
+
+    def mapper_trouble(self) -> str | None:
+        """Whoever has the directory maps."""
+        return None
 
     async def claim(self, *, wait: bool) -> Claim:
         """Whoever has the directory maps."""

@@ -42,11 +42,9 @@ def create(
     scope: Annotated[
         list[str], typer.Option(metavar="SCOPE", help="ingest, read or operate; may be repeated.")
     ],
-    site: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Bind an ingest token to this site.")
-    ] = None,
+    site: Annotated[str | None, typer.Option(metavar="NAME", help="Bind it to this site.")] = None,
     robot: Annotated[
-        str | None, typer.Option(metavar="NAME", help="And to this robot of it.")
+        str | None, typer.Option(metavar="NAME", help="And to this robot of it: ingest only.")
     ] = None,
     note: Annotated[str, typer.Option(metavar="TEXT", help="Who has it; shown by `list`.")] = "",
     data_dir: DataDir = None,
