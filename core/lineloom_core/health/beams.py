@@ -65,12 +65,12 @@ class _Stretch:
 
     def add(self, ranges: NDArray[np.float64]) -> None:
         with np.errstate(invalid="ignore"):
-            near = np.isfinite(ranges) & (ranges < _ARM_M)
+            near = (ranges > 0.0) & (ranges < _ARM_M)
         hits = ranges[near].astype(np.float32)
         self.nearest[near] = np.minimum(self.nearest[near], hits)
         self.farthest[near] = np.maximum(self.farthest[near], hits)
         self.near += near
-        self.invalid += np.isnan(ranges) | (ranges == -np.inf)
+        self.invalid += np.isnan(ranges) | (ranges <= 0.0)
         self.samples += 1
 
     @property

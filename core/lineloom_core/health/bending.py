@@ -51,6 +51,7 @@ class BendingCheck:
     since_m: float = 0.0
     since_rad: float = 0.0
     increment: float = 0.0
+    is_timed: bool = False
 
     def examine(self, sample: Sample) -> None:
         """Measure the next scan once the robot has moved on."""
@@ -61,6 +62,7 @@ class BendingCheck:
             return
         self.since_m = self.since_rad = 0.0
         self.increment = sample.scan.angle_increment
+        self.is_timed = sample.scan.time_increment > 0.0
         self.rounds.append(_round_wall(sample.features))
         bend = bend_of(sample.features)
         if bend is not None:
@@ -80,7 +82,7 @@ class BendingCheck:
         turning = np.abs(rows[:, 2]) > _TURNING
         rates = rows[turning, 2]
         skew = _robust((rows[turning, 0] - epsilon.value) / rates, weights[turning] * rates**2)
-        if skew.scans >= _LEAST_SCANS and skew.stands_out(_LEAST_SKEW_S):
+        if not self.is_timed and skew.scans >= _LEAST_SCANS and skew.stands_out(_LEAST_SKEW_S):
             found.append(_skew(abs(skew.value), self.increment))
         return found
 

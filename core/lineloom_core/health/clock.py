@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass, field
 
@@ -17,6 +18,9 @@ _MOST_SHARE = 0.1
 _LEAST_BAD = 5
 _FROZEN_SCANS = 10
 _LEAST_RETURNS = 30
+_DROVE_M, _DROVE_RAD = 0.3, 0.3
+
+_DROPPED = ". The wheels went on meanwhile: nothing is made of these scans"
 
 
 @storable("clock-check")
@@ -56,10 +60,20 @@ class ClockCheck:
 @storable("frozen-check")
 @dataclass
 class FrozenCheck:
-    """Scans in a row that equal each other in every beam: no lidar measures without noise."""
+    """Scans in a row that equal each other in every beam: no lidar measures without noise.
+
+    drove: how far [m] and by how much [rad] the wheels went meanwhile.
+    """
 
     last: NDArray[np.float64] | None = None
     equal: int = 0
+    drove: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def blinds(self) -> bool:
+        """Whether the sensor says nothing of where the robot is: it drives, by its wheels."""
+        moves = self.drove[0] > _DROVE_M or self.drove[1] > _DROVE_RAD
+        return self.equal >= _FROZEN_SCANS and moves
 
     def examine(self, sample: Sample) -> None:
         """Look at the next scan's ranges."""
@@ -67,7 +81,12 @@ class FrozenCheck:
         enough = np.count_nonzero(np.isfinite(ranges)) >= _LEAST_RETURNS
         same = self.last is not None and np.array_equal(ranges, self.last, equal_nan=True)
         self.equal = self.equal + 1 if enough and same else 0
-        self.last = ranges
+        self.last, rolled = ranges, sample.odometry_step
+        if self.equal == 0:
+            self.drove = (0.0, 0.0)
+        elif rolled is not None:
+            way, turn = self.drove
+            self.drove = way + math.hypot(rolled.x, rolled.y), turn + abs(rolled.theta)
 
     def findings(self) -> list[Finding]:
         """What is wrong now."""
@@ -78,6 +97,6 @@ class FrozenCheck:
                 "frozen",
                 "warning",
                 f"the last {self.equal + 1} scans are identical in every beam: the driver sends "
-                "one scan again and again; restart it",
+                "one scan again and again; restart it" + (_DROPPED if self.blinds else ""),
             )
         ]

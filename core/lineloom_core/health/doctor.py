@@ -14,18 +14,35 @@ from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lineloom_core.codec import storable
 from lineloom_core.features import ScanFeatures
 from lineloom_core.geometry import Pose
 from lineloom_core.health.beams import BeamCheck
 from lineloom_core.health.bending import BendingCheck
+from lineloom_core.health.breaks import BreakCheck
 from lineloom_core.health.clock import ClockCheck, FrozenCheck
+from lineloom_core.health.codes import CodeCheck
 from lineloom_core.health.finding import Finding
+from lineloom_core.health.lengths import LengthCheck
+from lineloom_core.health.no_lines import NoLinesCheck
+from lineloom_core.health.noise import NoiseCheck
+from lineloom_core.health.riding import RidingCheck
 from lineloom_core.health.sample import Sample
+from lineloom_core.health.sweep import SweepCheck
 from lineloom_core.health.turning import TurningCheck
 from lineloom_core.health.units import UnitsCheck
 from lineloom_core.scan import Scan
+
+_DEAF = {"units", "random", "frozen", "stuck", "constant", "no-returns", "angle-increment"}
+_EXPLAINED_BY = {
+    "breaks": {*_DEAF, "clock-jump"},
+    "no-lines": _DEAF,
+    "rides-along": {"self-hits"},
+    "turn-scale": {"angle-increment"},
+}
+"""What is but a consequence of another finding is not told beside it."""
 
 
 class Check(Protocol):
@@ -50,6 +67,13 @@ class SensorDoctor:
     turning: TurningCheck = field(default_factory=TurningCheck)
     beams: BeamCheck = field(default_factory=BeamCheck)
     bending: BendingCheck = field(default_factory=BendingCheck)
+    sweep: SweepCheck = field(default_factory=SweepCheck)
+    noise: NoiseCheck = field(default_factory=NoiseCheck)
+    codes: CodeCheck = field(default_factory=CodeCheck)
+    riding: RidingCheck = field(default_factory=RidingCheck)
+    lengths: LengthCheck = field(default_factory=LengthCheck)
+    breaks: BreakCheck = field(default_factory=BreakCheck)
+    no_lines: NoLinesCheck = field(default_factory=NoLinesCheck)
     _pose: Pose | None = None
     _track: int | None = None
     _odometry: Pose | None = None
@@ -57,12 +81,18 @@ class SensorDoctor:
 
     def prepared(self, scan: Scan) -> Scan:
         """Return a scan, counter-clockwise, without what is known to be false in it."""
+        if self.noise.blinds or self.frozen.blinds or self.lengths.blinds:
+            return _without(scan, np.ones(len(scan), dtype=np.bool_))
+        false = self.codes.mask(scan.ranges, scan.angle_increment)
         own = self.beams.own
-        if own is None or len(own) != len(scan) or not own.any():
-            return scan
-        ranges = np.where(own, np.nan, scan.ranges)
-        ranges.setflags(write=False)
-        return replace(scan, ranges=ranges)
+        if own is not None and len(own) == len(scan):
+            false |= own
+        false |= self.riding.mask(scan.ranges)
+        return _without(scan, false) if false.any() else scan
+
+    def timed(self, scan: Scan) -> Scan:
+        """Return a scan, as it came, with its beams timed in seconds."""
+        return self.sweep.mended(scan)
 
     def examine(
         self, scan: Scan, features: ScanFeatures, pose: Pose | None, track: int | None
@@ -72,23 +102,32 @@ class SensorDoctor:
         features: of the scan as it was mapped. pose: T_track_laser in the track of that number,
         None where tracking failed.
         """
-        step = odometry_step = None
+        step = rolled = None
         if pose is not None and self._pose is not None and track == self._track:
             step = self._pose.between(pose)
-            if scan.odometry is not None and self._odometry is not None:
-                odometry_step = self._odometry.between(scan.odometry)
+        if scan.odometry is not None and self._odometry is not None:
+            rolled = self._odometry.between(scan.odometry)
         elapsed = 0.0 if self._stamp is None else scan.stamp - self._stamp
-        sample = Sample(scan, features, step, odometry_step, elapsed)
+        placed = pose is not None
+        began = placed and track != self._track
+        sample = Sample(scan, features, step, rolled, elapsed, placed, began)
         for check in self._checks():
             check.examine(sample)
-        self._pose, self._track = pose, track
+        self._pose, self._track = pose, track if placed else self._track
         self._odometry, self._stamp = scan.odometry, scan.stamp
 
     def findings(self) -> tuple[Finding, ...]:
         """What is wrong now, errors first."""
         found = [finding for check in self._checks() for finding in check.findings()]
+        names = {finding.name for finding in found}
+        found = [f for f in found if not names & _EXPLAINED_BY.get(f.name, set())]
         order = {"error": 0, "warning": 1, "note": 2}
         return tuple(sorted(found, key=lambda finding: order[finding.severity]))
+
+    @property
+    def follows(self) -> bool:
+        """Whether most scans have a place beside the ones before: else a pose means nothing."""
+        return not self.breaks.is_hopeless
 
     @property
     def trustworthy(self) -> bool:
@@ -96,7 +135,27 @@ class SensorDoctor:
         return all(finding.severity != "error" for finding in self.findings())
 
     def _checks(self) -> tuple[Check, ...]:
-        return self.units, self.clock, self.frozen, self.turning, self.beams, self.bending
+        return (
+            self.units,
+            self.sweep,
+            self.clock,
+            self.frozen,
+            self.noise,
+            self.codes,
+            self.riding,
+            self.beams,
+            self.lengths,
+            self.turning,
+            self.bending,
+            self.breaks,
+            self.no_lines,
+        )
+
+
+def _without(scan: Scan, false: NDArray[np.bool_]) -> Scan:
+    ranges = np.where(false, np.nan, scan.ranges)
+    ranges.setflags(write=False)
+    return replace(scan, ranges=ranges)
 
 
 def without_skew(scan: Scan, turn_rate: float, *, inverted: bool = False) -> Scan:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from lineloom_core.features import ScanFeatures
 from lineloom_core.geometry import Pose
 from lineloom_core.scan import Scan
@@ -15,7 +17,8 @@ class Sample:
     """A scan in counter-clockwise order, its features, and how the robot came there.
 
     step: T_previous_this of the lidar as tracking saw it, since the scan before; None where either
-    was not placed. odometry_step: the same as the wheels say. elapsed_s: between the two stamps.
+    was not placed. odometry_step: the base's as the wheels say, where they do. elapsed_s: between
+    the two stamps. placed: whether tracking found it. began: it is the first of another track.
     """
 
     scan: Scan
@@ -23,11 +26,25 @@ class Sample:
     step: Pose | None
     odometry_step: Pose | None
     elapsed_s: float
+    placed: bool = True
+    began: bool = False
+
+    @property
+    def is_blinded(self) -> bool:
+        """Whether nothing was made of it though it holds something."""
+        made = np.isfinite(self.features.ranges).any()
+        return not made and bool(np.isfinite(self.scan.ranges).any())
 
     @property
     def moved_m(self) -> float:
         """How far the lidar moved since the scan before [m]."""
         return 0.0 if self.step is None else math.hypot(self.step.x, self.step.y)
+
+    @property
+    def driven_m(self) -> float:
+        """How far it drove [m], by its wheels where tracking does not know."""
+        step = self.step or self.odometry_step
+        return 0.0 if step is None else math.hypot(step.x, step.y)
 
     @property
     def turned_rad(self) -> float:

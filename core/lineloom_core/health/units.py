@@ -13,6 +13,8 @@ from lineloom_core.health.sample import Sample
 _SCANS = 10
 _BLIND_SCANS = 20
 _FAR_M = 100.0
+_MILLIMETRES = 700.0
+"""Half of all returns within 0.7 m, or within 7 m, according to what it is."""
 _NEAR_M = 0.2
 _BLIND_SHARE = 0.02
 
@@ -44,13 +46,14 @@ class UnitsCheck:
     def findings(self) -> list[Finding]:
         """What is wrong now."""
         if self.huge >= _SCANS:
+            unit, factor = ("milli", 1000) if self.median_m > _MILLIMETRES else ("centi", 100)
             return [
                 Finding(
                     "units",
                     "error",
                     f"half of all returns are farther than {self.median_m:.0f} m: ranges are in "
-                    "millimetres, it seems; send metres (divide ranges, range_min and range_max "
-                    "by 1000)",
+                    f"{unit}metres, it seems; send metres (divide ranges, range_min and range_max "
+                    f"by {factor})",
                 )
             ]
         if self.tiny >= _SCANS:

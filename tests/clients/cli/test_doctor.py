@@ -119,6 +119,10 @@ def in_millimetres(ranges: list[Any]) -> list[Any]:
     return [1000.0 * r if isinstance(r, float) else r for r in ranges]
 
 
+def halved(ranges: list[Any]) -> list[Any]:
+    return [0.5 * r if isinstance(r, float) else r for r in ranges]
+
+
 @pytest.mark.parametrize(
     ("check", "changes", "what"),
     [
@@ -127,6 +131,7 @@ def in_millimetres(ranges: list[Any]) -> list[Any]:
         ("clock", {"stamp": lambda s: 1e3 * s}, "milliseconds"),
         ("beams", {"angle_increment": 1e-5}, "One degree is 0.01745"),
         ("sensor mirrored", {"ranges": lambda r: r[::-1]}, "upside down"),
+        ("sensor length-scale", {"ranges": halved}, "another unit than metres"),
     ],
 )
 def test_one_fault_each(

@@ -17,8 +17,21 @@ from lineloom.wire import Scan
 _LONGEST_INDOORS_M = 200.0
 _MOST_MAPPED = 600
 _APART = "not-joined"
-_SURE = {"mirrored", "turn-scale"}
-"""Findings of the mapper's sensor doctor that spoil a map; so does what keeps it from joining."""
+_SURE = {
+    "breaks",
+    "clock-jump",
+    "constant",
+    "mirrored",
+    "no-return-code",
+    "odometry-units",
+    "random",
+    "stamp-units",
+    "stuck",
+    "tilted",
+    "time-increment",
+    "turn-scale",
+}
+"""Findings of the mapper's sensor doctor to be mended; so is what keeps a map from joining."""
 
 
 def check_scans(path: Path) -> Iterator[Finding]:

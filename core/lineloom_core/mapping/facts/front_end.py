@@ -68,6 +68,8 @@ def take(
     else:
         taken = _place(config, history, record, scan, tracked, version)
     record.doctor.examine(raw, features, tracked.pose if tracked else None, record.track)
+    if record.state == "tracking" and not record.doctor.follows:
+        record.state = "lost"
     return _distrust(history, record, taken)
 
 
@@ -82,7 +84,9 @@ def _in_order(record: RobotRecord, scan: Scan, *, is_late: bool) -> Scan:
     scan = replace(scan, ranges=ranges)
     inverted = record.mount.inverted
     if record.tracker is not None and not is_late:
-        scan = without_skew(scan, record.tracker.turn_rate, inverted=inverted)
+        timed = record.doctor.timed(scan)
+        still = without_skew(timed, record.tracker.turn_rate, inverted=inverted)
+        scan = replace(still, time_increment=scan.time_increment)  # for the doctor, as it came
     return scan.counter_clockwise(inverted=inverted)
 
 
