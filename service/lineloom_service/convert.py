@@ -160,6 +160,8 @@ def to_line(line: MapLine) -> wire.Line:
         robots=list(line.robots),
         first_seen=line.first_seen,
         last_seen=line.last_seen,
+        layer=line.layer,
+        wall=line.wall,
     )
 
 

@@ -6,7 +6,7 @@ import asyncio
 import hashlib
 import json
 import time
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ from lineloom_core.floorplan.fit import Judge
 from lineloom_core.floorplan.plan import FloorPlan
 from lineloom_core.floorplan.registration import Registration, follow, judge_of, register
 from lineloom_core.fusion.occupancy import Rays, rasterise
-from lineloom_core.mapping.answers.site_view import SiteView
+from lineloom_core.mapping.answers.site_view import MapLine, SiteView
 from numpy.typing import NDArray
 
 from lineloom_service.store.files import FileRecord, delete_file, list_files, put_file, read_file
@@ -120,9 +120,19 @@ async def judge_component(
     return await asyncio.to_thread(_judge, plan, seen, lines)
 
 
+def solid_lines(view: SiteView, component: str) -> list[MapLine]:
+    """Return the lines of a component that a building is known by: all but clutter."""
+    return [w for w in view.lines if w.component == component and w.layer != "clutter"]
+
+
 def lines_of(view: SiteView, component: str) -> NDArray[np.float64]:
-    """Return the lines of a component as rows x1, y1, x2, y2 [m]."""
-    rows = [(w.x1, w.y1, w.x2, w.y2) for w in view.lines if w.component == component]
+    """Return those lines as rows x1, y1, x2, y2 [m]."""
+    return rows_of(solid_lines(view, component))
+
+
+def rows_of(lines: Iterable[MapLine]) -> NDArray[np.float64]:
+    """Return lines as rows x1, y1, x2, y2 [m]."""
+    rows = [(w.x1, w.y1, w.x2, w.y2) for w in lines]
     return np.array(rows, dtype=np.float64).reshape(-1, 4)
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 
+from lineloom import wire
 from lineloom_core.fusion.occupancy import (
     DEFAULT_RESOLUTION_M,
     GridTooLargeError,
@@ -15,12 +16,13 @@ from lineloom_core.fusion.occupancy import (
 from lineloom_core.geometry import Pose
 from lineloom_core.io import nav2
 from lineloom_core.io.png import PictureTooLargeError
+from lineloom_core.io.reframe import in_layers
 from lineloom_core.io.selection import MOST_COORDINATE_M, BBox, check_bbox
 from lineloom_core.mapping.answers.site_view import SiteView
 
 from lineloom_service.asking import ask
 from lineloom_service.errors import INVALID_PARAMETER, ProblemError
-from lineloom_service.floorplans import RaySource, lines_of
+from lineloom_service.floorplans import RaySource, rows_of
 from lineloom_service.maps.line_history import LineHistory
 from lineloom_service.maps.map_json import write_line, write_map
 from lineloom_service.service import Service
@@ -50,13 +52,15 @@ async def render_map(
     component: str | None,
     box: BBox | None,
     resolution: float | None = None,
+    layers: tuple[str, ...] = wire.USUAL_LAYERS,
 ) -> bytes:
     """Return the map as a file. Raises ProblemError for what cannot be drawn."""
+    shown = replace(shown, view=in_layers(shown.view, layers))
     if format == "nav2":
-        return await _nav2(service, site, shown, component, box, resolution)
+        return await _nav2(service, site, shown, component, box, resolution, layers)
     if resolution is not None:
         raise ProblemError(INVALID_PARAMETER, "resolution: only a nav2 map has one")
-    form = (format, component, box, shown.key)
+    form = (format, component, box, shown.key, layers)
     write = _json if format == "json" else import_module(f"{_WRITERS}.{format}").write_map
     try:
         return await service.maps.drawn(
@@ -93,8 +97,21 @@ def read_bbox(text: str | None) -> BBox | None:
     return box
 
 
+def read_layers(text: str | None) -> tuple[str, ...]:
+    """Return the layers that `wall,furniture` and the like means. Raises ProblemError."""
+    if text is None:
+        return wire.USUAL_LAYERS
+    wanted = {part.strip() for part in text.split(",")}
+    if not wanted <= set(wire.LAYERS):
+        detail = f"query parameter 'layers': must be of {', '.join(wire.LAYERS)}, with commas"
+        raise ProblemError(INVALID_PARAMETER, detail)
+    return tuple(layer for layer in wire.LAYERS if layer in wanted)
+
+
 def _json(view: SiteView, component: str | None, box: BBox | None, site: str) -> bytes:
-    return write_map(site, view, LineHistory(write_line).at(view), component, box)
+    return write_map(
+        site, view, LineHistory(write_line).at(view), component, box, layers=wire.LAYERS
+    )
 
 
 async def _nav2(
@@ -104,6 +121,7 @@ async def _nav2(
     component: str | None,
     box: BBox | None,
     resolution: float | None,
+    layers: tuple[str, ...],
 ) -> bytes:
     components = [c.id for c in shown.view.components]
     chosen = component or (components[0] if len(components) == 1 else None)
@@ -113,9 +131,10 @@ async def _nav2(
         raise ProblemError(INVALID_PARAMETER, detail)
     T = shown.frames.get(chosen, Pose.identity())
     rays = (await ray_source(service, site, shown.view)(chosen)).moved(T)
-    lines, cell = lines_of(shown.view, chosen), resolution or DEFAULT_RESOLUTION_M
+    lines = rows_of(w for w in shown.view.lines if w.component == chosen)
+    cell = resolution or DEFAULT_RESOLUTION_M
     # Free space may be some scans newer than the view: the keyframes tell one from the next.
-    form = ("nav2", chosen, box, shown.key, cell, rays.poses.tobytes())
+    form = ("nav2", chosen, box, shown.key, cell, layers, rays.poses.tobytes())
     try:
         return await service.maps.drawn(
             site, shown.view, form, lambda: nav2.write_map(rasterise(rays, lines, cell, box))

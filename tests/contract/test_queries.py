@@ -150,7 +150,7 @@ async def test_map_as_json(client: httpx.AsyncClient) -> None:
     assert len(answer["lines"]) == 6
     assert set(answer["lines"][0]) == {
         *("id", "component", "x1", "y1", "x2", "y2", "sigma", "support"),
-        *("robots", "first_seen", "last_seen"),
+        *("robots", "first_seen", "last_seen", "layer", "wall"),
     }
 
 
@@ -181,6 +181,17 @@ async def test_map_formats(client: httpx.AsyncClient) -> None:
         problem["detail"]
         == "no format 'bmp'; available are json, geojson, svg, png, dxf, csv, ieee1873, nav2"
     )
+
+
+async def test_layers_are_chosen_in_every_format(client: httpx.AsyncClient) -> None:
+    walls = (await _get(client, "/map", layers="wall")).json()["lines"]
+    assert walls
+    assert {line["layer"] for line in walls} == {"wall"}
+    assert (await _get(client, "/map", layers="clutter")).json()["lines"] == []
+    drawn = (await _get(client, "/map", layers="clutter", format="geojson")).json()["features"]
+    assert "wall" not in {feature["properties"]["kind"] for feature in drawn}
+    problem = await _expect_refusal(client, f"{SITE}/map", 422, "invalid-parameter", layers="sky")
+    assert "wall, furniture, clutter" in problem["detail"]
 
 
 @pytest.mark.parametrize("bbox", ["", "1,2,3", "1,2,3,4,5", "a,b,c,d", "0,0,0,1", "nan,0,1,1"])

@@ -232,3 +232,18 @@ async def test_of_each_site_one_thing_is_drawn_at_a_time() -> None:
     assert drawn == [b"%d" % form for form in range(4) for _ in (1, 2)]
     assert (most[1], most[2]) == (1, 1)
     assert most[0] == 2  # sites do not wait for each other
+
+
+def test_clutter_is_told_only_to_those_who_ask() -> None:
+    lines = [MapLine(f"l{i}", "c1", 0.0, i, 1.0, i, 0.01, 3, ("a",), 0.0, 1.0) for i in range(3)]
+    before = replace(START, version=1, components=COMPONENTS, lines=tuple(lines))
+    lines[1] = replace(lines[1], layer="clutter")
+    after = replace(before, version=2, lines=tuple(lines))
+    history = LineHistory(write_line)
+    assert [w.id for w in _answer(history, before, None, None).lines] == ["l0", "l1", "l2"]
+    assert [w.id for w in _answer(history, after, None, None).lines] == ["l0", "l2"]
+    whole = _answer(history, after, None, None, None, False, wire.LAYERS)
+    assert [(w.id, w.layer) for w in whole.lines][1] == ("l1", "clutter")
+    # What has become clutter is gone for those who keep up without it.
+    news = _answer(history, after, None, None, 1)
+    assert (news.lines, news.removed) == ([], ["l1"])

@@ -52,6 +52,11 @@ def only(view: SiteView, components: Collection[str]) -> SiteView:
     )
 
 
+def in_layers(view: SiteView, layers: Collection[str]) -> SiteView:
+    """Return the view with the lines of some layers alone."""
+    return replace(view, lines=tuple(w for w in view.lines if w.layer in layers))
+
+
 def _rows_in(trajectory: TrajectoryView, components: Collection[str]) -> TrajectoryView:
     rows = [i for i, name in enumerate(trajectory.component) if name in components]
     return TrajectoryView(

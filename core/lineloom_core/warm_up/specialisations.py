@@ -108,6 +108,11 @@ MAPPING = _parsed(f"""
     matching._registration_kernels.correlate     | U2 f f F2 F1 f f f f f
     features._kernels.point_normals              | F2 B1 i
     fusion._kernels.extents                      | F2 I1 F2
+    fusion._wall_kernels.assign                  | F2 I1 F2 F2 F2 I1 I1 f f f i i f i I1 F1 F1 I2
+    fusion._wall_kernels.cover                   | I1 I1 I1 F1 F1 F2 F1 F1 I1 f f I1
+    fusion._wall_kernels.runs                    | I1 I1 i i i i
+    fusion._wall_kernels.said_by_keyframe        | I1 I1 F1 F1 i
+    fusion._wall_kernels.enter                   | F2 f f f i i
     matching._registration_kernels.thin          | F2 f i
     matching._registration_kernels.line_normals  | F2 I1 F2 F2
     matching._hypothesis.turn_information        | f f f f f f

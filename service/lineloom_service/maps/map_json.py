@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from lineloom import wire
 from lineloom_core.io.selection import BBox, clip
 from lineloom_core.mapping.answers.site_view import ComponentView, MapLine, SiteView
@@ -23,6 +25,7 @@ def write_map(
     box: BBox | None,
     since: int | None = None,
     since_settled: bool = False,
+    layers: Collection[str] = wire.USUAL_LAYERS,
 ) -> bytes:
     """Return the answer: the lines chosen, or what of them changed after version `since`.
 
@@ -38,7 +41,8 @@ def write_map(
         if known and since is not None and written.since <= (since, since_settled):
             continue
         place = by_component.get(written.line.component)
-        if place is not None and _touches(written.line, box):
+        chosen = written.line.layer in layers and _touches(written.line, box)
+        if place is not None and chosen:
             place.append(written.json)
         elif known:
             # Changed so that it is no longer among those asked for; or never was.

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from lineloom import wire
 from lineloom_core.io.selection import BBox
 from lineloom_core.mapping.answers.site_view import SiteView
 
@@ -23,6 +24,7 @@ class MapPart:
     box: BBox | None = None
     since: int | None = None
     since_settled: bool = False
+    layers: tuple[str, ...] = wire.USUAL_LAYERS
 
 
 WHOLE_MAP = MapPart()
@@ -59,7 +61,7 @@ class MapStore:
         history = self._histories.setdefault(site.id, LineHistory(write_line))
 
         def render() -> bytes:
-            chosen = part.component, part.box, part.since, part.since_settled
+            chosen = part.component, part.box, part.since, part.since_settled, part.layers
             return write_map(site.name, view, history.at(view), *chosen)
 
         return await self._cache.get((site.id, view.stage, "json", part), render)

@@ -28,7 +28,7 @@ from lineloom_service.errors import (
     UNSUPPORTED_TYPE,
     ProblemError,
 )
-from lineloom_service.floorplans import StoredPlan, judge_component
+from lineloom_service.floorplans import StoredPlan, judge_component, solid_lines
 from lineloom_service.map_files import ray_source
 from lineloom_service.openapi import also_as
 from lineloom_service.request_body import read_raw
@@ -186,7 +186,7 @@ def _pose(pose: Pose) -> wire.PoseAnswer:
 def _differences(
     site: SiteRecord, view: SiteView, component: str, found: Differences
 ) -> wire.PlanDifferences:
-    names = [w.id for w in view.lines if w.component == component]
+    names = [w.id for w in solid_lines(view, component)]
     missing = [wire.PlanPiece(x1=a, y1=b, x2=c, y2=d) for a, b, c, d in found.missing.tolist()]
     new = [
         wire.PlanPiece(x1=a, y1=b, x2=c, y2=d, line=names[of])

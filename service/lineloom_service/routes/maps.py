@@ -21,7 +21,7 @@ from lineloom_service.answers import (
 )
 from lineloom_service.dependencies import CurrentView, KnownSite, ServiceDep
 from lineloom_service.errors import INVALID_PARAMETER, UNKNOWN_COMPONENT, ProblemError
-from lineloom_service.map_files import read_bbox, render_map
+from lineloom_service.map_files import read_bbox, read_layers, render_map
 from lineloom_service.map_frames import AlignQuery, FrameQuery, in_frame, versioned
 from lineloom_service.maps.map_store import MapPart
 from lineloom_service.openapi import NOT_MODIFIED, also_as
@@ -53,6 +53,10 @@ async def get_map(
     resolution: Annotated[
         float | None, Query(gt=0.0, le=10.0, description="Metres a cell, for nav2.")
     ] = None,
+    layers: Annotated[
+        str | None,
+        Query(description="Of wall, furniture, clutter; all but clutter if left out."),
+    ] = None,
     since: Annotated[
         int | None,
         Query(ge=0, le=MAX_COUNTER, description="A `version`: only what has changed after it."),
@@ -75,17 +79,18 @@ async def get_map(
     if since is not None and not plain:
         detail = "query parameter 'since': goes with format=json in the map's own frame only"
         raise ProblemError(INVALID_PARAMETER, detail)
-    box = read_bbox(bbox)
+    box, chosen = read_bbox(bbox), read_layers(layers)
     if component is not None and all(c.id != component for c in view.components):
         return _elsewhere(request, view, component)
     headers = await versioned(service, site, view, frame)
     if matches(if_none_match, headers["ETag"]):
         return Response(status_code=304, headers=headers)
     if plain:
-        content = await service.maps.json(site, view, MapPart(component, box, since, since_settled))
+        part = MapPart(component, box, since, since_settled, chosen)
+        content = await service.maps.json(site, view, part)
     else:
         shown = await in_frame(service, site, view, align=align, frame=frame, component=component)
-        content = await render_map(service, site, shown, format, component, box, resolution)
+        content = await render_map(service, site, shown, format, component, box, resolution, chosen)
     return Response(content, headers=headers, media_type=wire.MAP_FORMATS[format].media_type)
 
 

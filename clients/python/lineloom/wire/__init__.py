@@ -45,7 +45,7 @@ from lineloom.wire.localize import (
     LocalizeHypothesis,
     LocalizeRequest,
 )
-from lineloom.wire.map import Line, MapAnswer, MapChanges, MapComponent
+from lineloom.wire.map import LAYERS, USUAL_LAYERS, Line, MapAnswer, MapChanges, MapComponent
 from lineloom.wire.map_format import MAP_FORMATS, MapFileKind, MapFormat, MapFormatList
 from lineloom.wire.match import Alternative, LinePair, MatchAnswer, MatchRequest, MatchScan
 from lineloom.wire.packing import JSON, MSGPACK, pack_json, pack_msgpack
@@ -61,12 +61,14 @@ from lineloom.wire.transform import Transform
 __all__ = [
     "ID_PATTERN",
     "JSON",
+    "LAYERS",
     "MAP_FORMATS",
     "MAX_BATCH",
     "MAX_BEAMS",
     "MAX_BODY_BYTES",
     "MAX_RUN",
     "MSGPACK",
+    "USUAL_LAYERS",
     "Alternative",
     "Answer",
     "AnyEvent",

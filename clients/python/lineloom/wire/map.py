@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import Field
 
 from lineloom.wire.base import Answer, Settled
+
+Layer = Literal["wall", "furniture", "clutter"]
+
+LAYERS: tuple[Layer, ...] = ("wall", "furniture", "clutter")
+
+USUAL_LAYERS: tuple[Layer, ...] = ("wall", "furniture")
+"""What a map shows unless others are asked for."""
 
 
 class MapComponent(Answer):
@@ -17,8 +26,11 @@ class MapComponent(Answer):
 class Line(Answer):
     """A piece of wall; the free side lies on the left of 1 -> 2.
 
-    sigma: standard deviation of the line's position across itself [m]. support: scans that saw
-    it. first_seen, last_seen: stamps on the seeing robots' own clocks.
+    sigma: standard deviation of the line's position across itself [m], against the poses of those
+    who saw it: its shape, not its place in the map. support: scans that saw it. first_seen,
+    last_seen: stamps on the seeing robots' own clocks. layer: `wall` has a metre or more on one
+    line, `furniture` less; `clutter` was seen once, or is short and meets nothing. wall: shared by
+    the pieces of one wall, which lie on one line; between them are openings.
     """
 
     id: str
@@ -32,6 +44,8 @@ class Line(Answer):
     robots: list[str]
     first_seen: float
     last_seen: float
+    layer: Layer = "wall"
+    wall: str = ""
 
 
 class MapChanges(Answer):

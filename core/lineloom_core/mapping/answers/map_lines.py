@@ -1,19 +1,23 @@
-"""The lines of the map: fused over all keyframes, without what later scans look through."""
+"""The lines of the map: walls of all keyframes, without what later scans look through."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lineloom_core.fusion import FusedLines, LineObservations, fuse
-from lineloom_core.fusion.persistence import Stretch, lasting_stretches
-from lineloom_core.geometry import Pose
+from lineloom_core.features._kernels import VAR_OFFSET
+from lineloom_core.fusion import LineObservations
+from lineloom_core.fusion.corners import close_corners
+from lineloom_core.fusion.layers import layers_of
+from lineloom_core.fusion.persistence import lasting_stretches
+from lineloom_core.fusion.stretches import Stretches
+from lineloom_core.fusion.walls import Surfaces, find_walls
 from lineloom_core.mapping.answers.ray_source import rays_of
 from lineloom_core.mapping.answers.site_view import MapLine
 from lineloom_core.mapping.belief.site_map import SiteMap
+from lineloom_core.mapping.facts.keyframe import Keyframe
 
 _LINES_PER_KEYFRAME = 100_000
 """Observation ids: keyframe times this plus the line's extraction number; stable for ever."""
@@ -24,106 +28,103 @@ def fused_lines(site: SiteMap, component_of: dict[int, str]) -> tuple[MapLine, .
     members: dict[str, list[int]] = {}
     for keyframe, component in component_of.items():
         members.setdefault(component, []).append(keyframe)
-    names = sorted({k.robot for k in site.keyframes.values()})
     lines: list[MapLine] = []
     for component, keyframes in members.items():
-        lines.extend(_component_lines(site, component, keyframes, names))
+        lines.extend(_component_lines(site, component, sorted(keyframes)))
     return tuple(lines)
 
 
-def _component_lines(
-    site: SiteMap, component: str, keyframes: list[int], names: list[str]
-) -> Iterator[MapLine]:
-    """The lines that last; of one that lasts in parts, each part with those who saw it."""
-    observations = _observations(site, keyframes, names)
+def _component_lines(site: SiteMap, component: str, keyframes: list[int]) -> Iterator[MapLine]:
+    """The walls that last, with their corners closed; those that one keyframe saw as they are."""
+    frames = [site.keyframes[k] for k in keyframes]
+    poses = np.array([site.pose(k).to_array() for k in keyframes]).reshape(-1, 3)
+    observations = _observations(frames, poses)
     if len(observations) == 0:
         return
-    fused = fuse(observations, site.config.fusion)
-    rays = rays_of(site, sorted(keyframes))
-    parts = dict[int, int]()
-    for stretch in lasting_stretches(fused.endpoints, rays, site.config.persistence):
-        number = parts[stretch.line] = parts.get(stretch.line, -1) + 1
-        name = f"l{fused.id[stretch.line]}" + (f".{number}" if number else "")
-        if stretch.whole:
-            yield _whole_line(fused, stretch.line, name, component, names)
-        else:
-            yield _part_of_line(fused, observations, stretch, name, component, names)
+    walls = find_walls(observations, _surfaces(frames, poses), site.config.fusion)
+    rays, config = rays_of(site, keyframes), site.config.persistence
+    lasting = lasting_stretches(walls.endpoints, rays, config)
+    if not lasting:
+        return
+    of = np.array([s.line for s in lasting], dtype=np.int64)
+    begin, end = np.array([s.begin for s in lasting]), np.array([s.end for s in lasting])
+    ends, once = _cut(walls.endpoints[of], begin, end), walls.once[of]
+    met = np.zeros((len(of), 2), dtype=np.bool_)
+    ends[~once], met[~once] = close_corners(ends[~once], rays, config)
+    layers, names = layers_of(ends, walls.wall[of], once, met), _names(walls, of)
+    for k, seen in enumerate(walls.seen_by(of, begin, end)):
+        if len(seen) < site.config.fusion.min_support:
+            continue
+        saw = [frames[f] for f in seen.tolist()]
+        stamps = [f.scan.stamp for f in saw]
+        x1, y1, x2, y2 = ends[k].tolist()
+        yield MapLine(
+            id=names[k],
+            component=component,
+            x1=x1,
+            y1=y1,
+            x2=x2,
+            y2=y2,
+            sigma=float(walls.sigma[of[k]]),
+            support=len(saw),
+            robots=tuple(sorted({f.robot for f in saw})),
+            first_seen=min(stamps),
+            last_seen=max(stamps),
+            layer=layers[k],
+            wall=f"w{walls.wall_id[of[k]]}",
+        )
 
 
-def _whole_line(fused: FusedLines, i: int, name: str, component: str, names: list[str]) -> MapLine:
-    x1, y1, x2, y2 = fused.endpoints[i].tolist()
-    return MapLine(
-        id=name,
-        component=component,
-        x1=x1,
-        y1=y1,
-        x2=x2,
-        y2=y2,
-        sigma=float(fused.sigma[i]),
-        support=int(fused.support[i]),
-        robots=tuple(names[r] for r in fused.robots[i]),
-        first_seen=float(fused.first_seen[i]),
-        last_seen=float(fused.last_seen[i]),
+def _names(walls: Stretches, of: NDArray[np.int64]) -> list[str]:
+    """Name what is left of stretches: parts of one, and those that have no name, by number."""
+    names: list[str] = []
+    parts: dict[str, int] = {}
+    for i in of.tolist():
+        name = f"l{walls.id[i]}" if walls.id[i] >= 0 else f"w{walls.wall_id[i]}"
+        number = parts[name] = parts.get(name, -1) + 1
+        names.append(f"{name}.{number}" if number or walls.id[i] < 0 else name)
+    return names
+
+
+def _cut(
+    lines: NDArray[np.float64], begin: NDArray[np.float64], end: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return what is left of each line, (m, 4)."""
+    along = lines[:, 2:] - lines[:, :2]
+    along = along / np.hypot(along[:, 0], along[:, 1])[:, None]
+    start = lines[:, :2]
+    return np.hstack([start + begin[:, None] * along, start + end[:, None] * along])
+
+
+def _surfaces(frames: Sequence[Keyframe], poses: NDArray[np.float64]) -> Surfaces:
+    clouds = [f.cloud for f in frames]
+    return Surfaces(
+        poses=poses,
+        begins=np.cumsum([0, *(len(c.points) for c in clouds)]),
+        points=np.concatenate([c.points for c in clouds]),
+        normals=np.concatenate([c.normals for c in clouds]),
+        beams=np.concatenate([f.features.beams for f in frames]),
     )
 
 
-def _part_of_line(
-    fused: FusedLines,
-    observations: LineObservations,
-    stretch: Stretch,
-    name: str,
-    component: str,
-    names: list[str],
-) -> MapLine:
-    start, end = fused.endpoints[stretch.line, :2], fused.endpoints[stretch.line, 2:]
-    along = (end - start) / np.hypot(*(end - start))
-    ends = observations.endpoints.reshape(-1, 2, 2)
-    from_to = np.sort((ends - start) @ along, axis=1)
-    saw = fused.line_of == stretch.line
-    saw &= (from_to[:, 0] < stretch.end) & (from_to[:, 1] > stretch.begin)
-    if not saw.any():  # between two observations that lie within the fusion's gap
-        saw = fused.line_of == stretch.line
-    (x1, y1), (x2, y2) = start + stretch.begin * along, start + stretch.end * along
-    return MapLine(
-        id=name,
-        component=component,
-        x1=float(x1),
-        y1=float(y1),
-        x2=float(x2),
-        y2=float(y2),
-        sigma=float(fused.sigma[stretch.line]),
-        support=len(np.unique(observations.keyframe[saw])),
-        robots=tuple(names[r] for r in np.unique(observations.robot[saw])),
-        first_seen=float(observations.stamp[saw].min()),
-        last_seen=float(observations.stamp[saw].max()),
-    )
-
-
-def _observations(site: SiteMap, keyframes: list[int], names: list[str]) -> LineObservations:
+def _observations(frames: Sequence[Keyframe], poses: NDArray[np.float64]) -> LineObservations:
     """All keyframes' lines in the component's frame."""
-    rows = [(k, site.keyframes[k], site.keyframes[k].segments) for k in keyframes]
-    counts = np.array([len(segments) for _, _, segments in rows])
-    number = {name: i for i, name in enumerate(names)}
+    seen = [f.features.lines for f in frames]
+    lines, counts = np.concatenate(seen), [len(s) for s in seen]
+    of = np.repeat(np.arange(len(frames)), counts)
+    keyframe = np.array([f.id for f in frames], dtype=np.int64)[of]
+    c, s = np.cos(poses[of, 2, None]), np.sin(poses[of, 2, None])
+    x, y = lines[:, 0:4:2], lines[:, 1:4:2]
+    endpoints = np.empty((len(lines), 4))
+    endpoints[:, 0::2] = c * x - s * y + poses[of, 0, None]
+    endpoints[:, 1::2] = s * x + c * y + poses[of, 1, None]
+    number = np.arange(len(lines)) - np.cumsum([0, *counts])[of]
     return LineObservations(
-        endpoints=np.concatenate([_moved(site.pose(k), segments) for k, _, segments in rows]),
-        sigma=np.concatenate([segments[:, 4] for _, _, segments in rows]),
-        weight=np.ones(int(counts.sum())),
-        keyframe=np.repeat(np.array([k for k, _, _ in rows], dtype=np.int64), counts),
-        robot=np.repeat(np.array([number[f.robot] for _, f, _ in rows], dtype=np.int64), counts),
-        stamp=np.repeat(np.array([f.scan.stamp for _, f, _ in rows]), counts),
-        id=np.concatenate(
-            [
-                k * _LINES_PER_KEYFRAME + np.arange(len(segments), dtype=np.int64)
-                for k, _, segments in rows
-            ]
-        ),
+        endpoints=endpoints,
+        sigma=np.sqrt(lines[:, VAR_OFFSET]),
+        weight=np.ones(len(lines)),
+        keyframe=keyframe,
+        robot=np.zeros(len(lines), dtype=np.int64),
+        stamp=np.zeros(len(lines)),
+        id=keyframe * _LINES_PER_KEYFRAME + number,
     )
-
-
-def _moved(pose: Pose, segments: NDArray[np.float64]) -> NDArray[np.float64]:
-    c, s = math.cos(pose.theta), math.sin(pose.theta)
-    x, y = segments[:, 0:4:2], segments[:, 1:4:2]
-    moved = np.empty((len(segments), 4))
-    moved[:, 0:4:2] = c * x - s * y + pose.x
-    moved[:, 1:4:2] = s * x + c * y + pose.y
-    return moved

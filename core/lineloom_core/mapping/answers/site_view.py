@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lineloom_core.codec import storable
 from lineloom_core.geometry import Pose
+from lineloom_core.layer import Layer
 from lineloom_core.mapping.belief.claim import Claim, Origin
 from lineloom_core.mapping.belief.constraint_state import (
     ConstraintKind,
@@ -85,8 +86,10 @@ class TrajectoryView:
 class MapLine:
     """A wall piece seen by one or more scans; the free side lies left of 1 -> 2.
 
-    sigma [m]: one standard deviation of the line's position across itself. support: scans
-    (keyframes) that saw it. first_seen / last_seen: stamps on the seeing robots' own clocks.
+    sigma [m]: one standard deviation of the line's position across itself, against the poses of
+    those who saw it (its shape, not its place in the map). support: scans (keyframes) that saw it.
+    first_seen / last_seen: stamps on the seeing robots' own clocks. wall: shared by the pieces of
+    one wall, which lie on one line; between them are openings.
     """
 
     id: str
@@ -100,6 +103,8 @@ class MapLine:
     robots: tuple[str, ...]
     first_seen: float
     last_seen: float
+    layer: Layer = "wall"
+    wall: str = ""
 
 
 @storable("keyframe-view")

@@ -19,7 +19,7 @@
  *
  * @typedef {{id: string, component: string, x1: number, y1: number, x2: number, y2: number,
  *   sigma: number, support: number, robots: string[], first_seen: number,
- *   last_seen: number}} LineAnswer
+ *   last_seen: number, layer: "wall"|"furniture"|"clutter", wall: string}} LineAnswer
  * @typedef {{site: string, version: number, settled: boolean,
  *   components: {id: string, robots: string[]}[],
  *   lines: LineAnswer[]}} MapAnswer

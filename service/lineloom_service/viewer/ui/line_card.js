@@ -30,7 +30,7 @@ export function lineCard(line, { state, palette, onClose, onPick }) {
     onClose,
     facts([
       ["Length", metres(length)],
-      ["Position known to", `± ${metres(line.sigma)}`],
+      ["Shape known to", `± ${metres(line.sigma)}`],
       ["Component", brief(line.component)],
       ["From", `${line.x1.toFixed(2)}, ${line.y1.toFixed(2)}`],
       ["To", `${line.x2.toFixed(2)}, ${line.y2.toFixed(2)}`],
