@@ -22,7 +22,7 @@ from lineloom_service.engine.hosted_site import Remaking
 from lineloom_service.engine.published import Published
 from lineloom_service.relative_pose import RelativePose
 from lineloom_service.store.codec import decode_mount
-from lineloom_service.store.records import RobotRecord, SiteRecord, Skip
+from lineloom_service.store.records import SCANS, RobotRecord, SiteRecord, Skip
 
 
 def to_scan(scan: wire.Scan) -> Scan:
@@ -37,7 +37,7 @@ def to_scan(scan: wire.Scan) -> Scan:
         range_min=scan.range_min,
         range_max=scan.range_max,
         stamp=scan.stamp,
-        seq=scan.seq,
+        seq=scan.seq or 0,
         session=scan.session,
         time_increment=scan.time_increment,
         scan_time=scan.scan_time,
@@ -87,15 +87,28 @@ def to_site(
     )
 
 
-def to_robot(site: str, record: RobotRecord, view: SiteView, skips: Iterable[Skip]) -> wire.Robot:
-    """Return a robot at its latest processed scan."""
+def to_robot(
+    site: str,
+    record: RobotRecord,
+    view: SiteView,
+    skips: Iterable[Skip],
+    conflict: str | None = None,
+) -> wire.Robot:
+    """Return a robot at its latest processed scan. conflict: why scans of it are refused."""
     skipped = [skip for skip in skips if skip.robot == record.name]
     seen = view.robots.get(record.name)
     processed = 0 if seen is None else seen.scans_processed
-    skipped_scans = sum(skip.kind == "scan" for skip in skipped)
+    skipped_scans = sum(skip.kind in SCANS for skip in skipped)
     health = [] if seen is None else list(seen.health)
+    if conflict is not None:
+        health.append(conflict)
     if record.held:
         health.append(f"{record.held} scans wait for those with lower seq")
+    if record.late:
+        health.append(
+            f"back-fill: {record.late} scans came after those that follow them; once no more of "
+            "them come, the map is made anew with them at their places"
+        )
     health += [_describe_skip(skip) for skip in skipped]
     return wire.Robot(
         robot=record.name,
@@ -262,7 +275,7 @@ def _counts(accepted: int, processed: int, skipped: int) -> wire.ScanCounts:
 
 
 def _describe_skip(skip: Skip) -> str:
-    what = f"scan {skip.seq} of session {skip.session!r}" if skip.kind == "scan" else skip.kind
+    what = f"scan {skip.seq} of session {skip.session!r}" if skip.kind in SCANS else skip.kind
     return f"{what} was left out of the map: {skip.reason}"
 
 

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
-from lineloom_service.store.records import BacklogFullError, StoreError
+from lineloom_service.store.records import BacklogFullError, StorageFullError, StoreError
 
 PROBLEM_JSON = "application/problem+json"
 
@@ -62,6 +62,7 @@ NOT_READY = Kind("not-ready", 503, "The service is not ready yet")
 TOO_MANY_STREAMS = Kind("too-many-streams", 503, "Too many listeners already")
 TOO_MUCH_AT_ONCE = Kind("too-much-at-once", 503, "Too many large bodies at a time")
 STORAGE = Kind("storage", 503, "The storage failed")
+STORAGE_FULL = Kind("storage-full", 507, "The storage is full")
 _OTHER = Kind("http", 400, "The request was refused")
 
 KINDS = tuple(value for value in list(globals().values()) if isinstance(value, Kind))
@@ -171,6 +172,10 @@ def install(app: FastAPI, allowed_methods: Callable[[str], Sequence[str]]) -> No
     async def _backlog(request: Request, error: BacklogFullError) -> Response:
         detail = f"{error}; nothing of this request was taken, send it again later"
         return _counted(request, BACKLOG_FULL, detail, headers={"Retry-After": "2"})
+
+    @app.exception_handler(StorageFullError)
+    async def _full(request: Request, error: StorageFullError) -> Response:
+        return _counted(request, STORAGE_FULL, str(error), headers={"Retry-After": "30"})
 
     @app.exception_handler(StoreError)
     async def _storage(request: Request, error: StoreError) -> Response:

@@ -16,12 +16,15 @@ from lineloom_service.convert import to_scan
 from lineloom_service.errors import field_errors, invalid_body, pointer
 from lineloom_service.request_body import Body
 from lineloom_service.store.codec import encode_scan
-from lineloom_service.store.records import NewScan
+from lineloom_service.store.records import Conflict, NewScan
 
 _SLICE = 50
 """Scans decoded before other requests get their turn."""
 
 _REASONS_SHOWN = 3
+
+CONFLICT = "conflict"
+"""The reason for a scan whose session has another one of its seq."""
 
 
 @dataclass(slots=True)
@@ -55,7 +58,7 @@ async def take_in(body: Body, max_batch: int) -> Intake:
     intake = Intake()
     for index, value in enumerate(scans):
         try:
-            intake.scans.append(_new_scan(value, body.is_json, pointer("scans", index)))
+            intake.scans.append(_new_scan(value, body.is_json, pointer("scans", index), index))
         except _BadScanError as bad:
             intake.errors += bad.errors
             intake.rejected.append(_rejected(index, value, bad.errors))
@@ -80,7 +83,7 @@ def _check_batch(scans: Any, max_batch: int) -> list[Any]:
     return checked
 
 
-def _new_scan(value: Any, is_json: bool, prefix: str) -> NewScan:
+def _new_scan(value: Any, is_json: bool, prefix: str, index: int = 0) -> NewScan:
     try:
         wire = Scan.model_validate(value, context=STRICT_JSON if is_json else None)
     except ValidationError as error:
@@ -90,7 +93,7 @@ def _new_scan(value: Any, is_json: bool, prefix: str) -> NewScan:
     except InvalidScanError as error:
         fault = FieldError(pointer=prefix + pointer(error.field), reason=error.reason)
         raise _BadScanError([fault]) from None
-    return NewScan(scan.session, scan.seq, encode_scan(scan))
+    return NewScan(scan.session, wire.seq, encode_scan(scan), scan.stamp, index)
 
 
 def _rejected(index: int, value: Any, errors: Sequence[FieldError]) -> RejectedScan:
@@ -103,4 +106,24 @@ def _rejected(index: int, value: Any, errors: Sequence[FieldError]) -> RejectedS
     if len(errors) > _REASONS_SHOWN:
         shown.append(f"and {len(errors) - _REASONS_SHOWN} more")
     usable = isinstance(seq, int) and not isinstance(seq, bool) and 0 <= seq < 2**63
-    return RejectedScan(index=index, seq=seq if usable else None, reason="; ".join(shown))
+    return RejectedScan(
+        index=index,
+        seq=seq if usable else None,
+        reason="; ".join(shown),
+        pointer=errors[0].pointer or prefix,
+    )
+
+
+def conflicting(conflict: Conflict, *, batch: bool) -> RejectedScan:
+    """Return what is answered of a scan whose name another one has. batch: it came in a list."""
+    prefix = pointer("scans", conflict.index) if batch else ""
+    return RejectedScan(
+        index=conflict.index,
+        seq=conflict.seq,
+        reason=CONFLICT,
+        pointer=prefix + pointer("seq"),
+        detail=f"session {conflict.session!r} has another scan with seq {conflict.seq}, of stamp "
+        f"{conflict.known:.6f}, this one's is {conflict.stamp:.6f}. seq has to grow from scan to "
+        "scan: where its counter begins again, begin another session; where there is none, leave "
+        "seq out; where two robots send under this name, give each its own",
+    )

@@ -19,6 +19,7 @@ from lineloom_service.events.recorder import EventRecorder
 from lineloom_service.floorplans import FloorPlans
 from lineloom_service.maps.map_store import MapStore
 from lineloom_service.matching import PairMatcher
+from lineloom_service.observation.conflicts import Conflicts
 from lineloom_service.observation.latency import Latency
 from lineloom_service.observation.metrics import Metrics, SiteFigures
 from lineloom_service.observation.storage_watch import StorageWatch
@@ -74,6 +75,7 @@ class Service:
         )
         self.storage = StorageWatch(self.store.check)
         self.metrics = Metrics()
+        self.conflicts = Conflicts()
         self._latency = Latency()
         self._sites_seen: list[SiteRecord] = []
         self.metrics.watch(

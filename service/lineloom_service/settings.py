@@ -100,6 +100,12 @@ class Settings(BaseSettings):
     gap_window_s: float = Field(
         default=2.0, ge=0.0, description="How long a scan waits for those before it."
     )
+    back_fill_after_s: float = Field(
+        default=3.0,
+        ge=0.0,
+        description="Scans that came after their successors are mapped at their places once no "
+        "more of them came for this long.",
+    )
     max_held: int = Field(
         default=5_000, ge=1, description="Scans of one session that may wait for a gap to fill."
     )

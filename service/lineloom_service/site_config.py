@@ -16,6 +16,7 @@ from lineloom_core.mapping.digest import digest
 from lineloom_core.parameters import ParameterError, values
 
 from lineloom_service.store.config_entry import ConfigEntry
+from lineloom_service.store.feed_order import parted
 from lineloom_service.store.records import SiteRecord
 
 _LOG = logging.getLogger(__name__)
@@ -54,7 +55,7 @@ def to_order(site: SiteRecord, base: MapperConfig, told: str | None) -> ConfigEn
     elif told is None:
         same = base == MapperConfig()
     else:
-        same = told == f"{order.digest}@0"
+        same = parted(told)[0] == f"{order.digest}@0"
     return None if same else order
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 from collections.abc import Callable
 from typing import Any
 
@@ -63,6 +64,23 @@ async def test_a_failing_storage_is_503_and_nothing_is_taken(
     assert (await client.get("/v1/sites/s")).status_code == 404
 
 
+async def test_a_full_disk_is_507_in_those_words(
+    client: httpx.AsyncClient, make_scan: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(ingest, "append_scans", fail)
+    response = await client.post("/v1/sites/s/robots/r/scans", json=make_scan(0))
+    assert response.status_code == 507
+    assert response.headers["retry-after"]
+    problem = response.json()
+    assert problem["type"] == "/problems/storage-full"
+    assert "disk" in problem["detail"]
+    assert "full" in problem["detail"]
+    assert wire.Problem.model_validate(problem).status == 507
+
+
 async def test_types_are_stable() -> None:
     assert sorted(kind.slug for kind in KINDS) == [
         "backlog-full",
@@ -83,6 +101,7 @@ async def test_types_are_stable() -> None:
         "not-registered",
         "slow-body",
         "storage",
+        "storage-full",
         "too-large",
         "too-many-requests",
         "too-many-streams",
@@ -132,7 +151,7 @@ async def test_the_openapi_document_names_every_route_body_and_error(
     assert set(post["requestBody"]["content"]) == {"application/json", "application/msgpack"}
     assert "application/problem+json" in post["responses"]["422"]["content"]
     assert schemas["Scan"]["required"] == [
-        *("seq", "stamp", "angle_min", "angle_increment", "range_min", "range_max", "ranges")
+        *("stamp", "angle_min", "angle_increment", "range_min", "range_max", "ranges")
     ]
     assert _dangling(document, schemas) == set()
 

@@ -212,7 +212,7 @@ async def _snapshot(engine: LocalEngine) -> Snapshot:
     """One of five chapters, as the engine gives it."""
     await engine.start_site(SITE, 0, None)
     scans = [new_scan(seq) for seq in range(5 * SEALED)]
-    entries = [LogEntry(s.seq + 1, "scan", "r", s.session, s.seq, s.body) for s in scans]
+    entries = [LogEntry(at, "scan", "r", s.session, s.seq, s.body) for at, s in enumerate(scans, 1)]
     await engine.feed(SITE, entries, len(entries), caught_up=True)
     return await engine.snapshot(SITE)
 

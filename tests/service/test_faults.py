@@ -17,7 +17,7 @@ from lineloom_service.settings import Settings
 from lineloom_service.store.actions import append_scans
 from lineloom_service.store.codec import encode_scan
 from lineloom_service.store.reads import read_feed
-from lineloom_service.store.records import NewScan, StoreError
+from lineloom_service.store.records import NewScan, StorageFullError
 from lineloom_service.store.sql_store import SqlStore
 from lineloom_service.store.sqlite_database import SqliteDatabase
 from sqlalchemy import event
@@ -71,10 +71,10 @@ async def test_a_full_disk_refuses_whole_posts_and_goes_on_when_there_is_room(
     for start in range(10, 2000, 10):
         try:
             taken += await _post(store, range(start, start + 10), beams=800)
-        except StoreError as error:
+        except StorageFullError as error:
             refusal = str(error)
             break
-    assert refusal == "the storage failed: OperationalError"
+    assert "is full: nothing of the request was taken" in refusal
     assert taken % 10 == 0
     record = await store.site("s")
     assert record is not None

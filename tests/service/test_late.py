@@ -15,7 +15,9 @@ from hypothesis import strategies as st
 from lineloom_core.scan import Scan
 from lineloom_service.engine.mapper import apply
 from lineloom_service.store.actions import append_scans
+from lineloom_service.store.back_fill import place_late
 from lineloom_service.store.codec import decode_scan, encode_scan
+from lineloom_service.store.feed_order import read_order
 from lineloom_service.store.reads import read_feed
 from lineloom_service.store.records import LogEntry, NewScan
 from lineloom_service.store.sql_store import SqlStore
@@ -55,11 +57,16 @@ async def _logged(
         for _ in range(6000):
             record = await store.site("s")
             assert record is not None
-            if not record.held:
+            if record.held == record.late:
                 break
             await asyncio.sleep(0.01)
         assert record is not None
-        entries = await store.read(read_feed, record.id, 0, 10**5)
+        await store.write(place_late, record.id)
+        record = await store.site("s")
+        assert record is not None
+        assert record.held == 0
+        order = await store.read(read_order, record.id, record.order)
+        entries = await store.read(read_feed, record.id, 0, 10**5, order)
         await store.close()
     return entries, accepted
 
@@ -76,7 +83,7 @@ def _map(entries: Sequence[LogEntry]) -> list[str]:
 def _ordered() -> list[str]:
     mapper = FakeMapper()
     for scan in map(_scan, range(SCANS)):
-        mapper.add("r", decode_scan(scan.body, scan.session, scan.seq))
+        mapper.add("r", decode_scan(scan.body, scan.session, scan.seq or 0))
     return [line.id for line in mapper.view().lines]
 
 
@@ -110,25 +117,38 @@ async def test_a_robot_that_was_offline_for_hours_back_fills_in_order() -> None:
     assert [entry.seq for entry in entries] == list(range(1010))
 
 
-async def test_a_back_fill_behind_newer_scans_is_taken_at_once_and_whole() -> None:
+async def test_a_back_fill_behind_newer_scans_goes_where_it_belongs() -> None:
     live = [_scan(seq) for seq in range(10)]
     newest = [_scan(seq) for seq in range(500, 510)]
     back_fill = [[_scan(seq) for seq in range(start, start + 98)] for start in range(10, 500, 98)]
     entries, accepted = await _logged([live, newest], 0.05)
     assert [entry.seq for entry in entries] == [*range(10), *range(500, 510)]
-    entries, accepted = await _logged([live, newest, *back_fill], 0.05)
+    entries, accepted = await _logged([live, newest, *back_fill], 0.0)
     assert accepted == 510
-    assert sorted(entry.seq or 0 for entry in entries) == list(range(510))
-    assert [entry.position for entry in entries] == list(range(1, 511))
+    assert [entry.seq for entry in entries if entry.kind != "order"] == list(range(510))
+    assert sorted(entry.position for entry in entries) == list(range(1, 512))
+
+
+async def test_what_an_older_session_has_left_goes_before_the_younger_one() -> None:
+    posts = [[_scan(0, "a"), _scan(1, "a")], [_scan(0, "b")], [_scan(3, "a"), _scan(2, "a")]]
+    entries, _ = await _logged(posts, 0.0)
+    fed = [(entry.session, entry.seq) for entry in entries if entry.kind != "order"]
+    assert fed == [("a", 0), ("a", 1), ("a", 2), ("a", 3), ("b", 0)]
+
+
+async def test_blocks_that_come_newest_first_are_fed_oldest_first() -> None:
+    blocks = [[_scan(seq) for seq in range(start, start + 10)] for start in range(90, -1, -10)]
+    entries, _ = await _logged(blocks, 0.0)
+    assert [entry.seq for entry in entries if entry.kind != "order"] == list(range(100))
 
 
 async def test_sessions_go_in_the_order_first_seen() -> None:
     posts = [[_scan(0, "b"), _scan(1, "b")], [_scan(0, "a")], [_scan(2, "b"), _scan(1, "a")]]
     entries, _ = await _logged(posts, 60.0)
-    assert [(entry.session, entry.seq) for entry in entries] == [
+    assert [(entry.session, entry.seq) for entry in entries if entry.kind != "order"] == [
         ("b", 0),
         ("b", 1),
-        ("a", 0),
         ("b", 2),
+        ("a", 0),
         ("a", 1),
     ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lineloom_service.store.sequencer import Sequencer, Stream
@@ -11,7 +13,8 @@ WINDOW = 2.0
 
 def _arrive(order: Sequencer, session: str, seq: int, now: float, entry: int | None = None) -> None:
     stream = order.streams.setdefault(session, Stream(len(order.streams) + 1, session))
-    stream.hold(seq, seq if entry is None else entry, now)
+    late = order.is_late(stream, seq)
+    stream.hold(seq, seq if entry is None else entry, now, late=late)
 
 
 def _sequencer(max_held: int = 1000) -> Sequencer:
@@ -43,17 +46,23 @@ def test_every_scan_goes_out_exactly_once_and_none_waits_beyond_the_window(
 ) -> None:
     sequencer, now, released, due = _sequencer(), 0.0, [], {}
     taken: set[tuple[str, int]] = set()
+    names: dict[int, tuple[str, int]] = {}
     for entry, (session, seq, pause) in enumerate(arrivals):
         now += pause
         if (session, seq) in taken:
             continue
         taken.add((session, seq))
+        names[entry] = (session, seq)
         _arrive(sequencer, session, seq, now, entry)
         due[entry] = now + WINDOW
         released += sequencer.release(now)
-        assert all(e in released for e, limit in due.items() if limit <= now)
+        late = {e for stream in sequencer.streams.values() for e in stream.late.values()}
+        assert all(e in released for e, limit in due.items() if limit <= now and e not in late)
     while (deadline := sequencer.next_deadline()) is not None:
         released += sequencer.release(deadline + 1e-9)
+    sent = [names[entry] for entry in released]
+    assert all(a[1] < b[1] for a, b in pairwise(sent) if a[0] == b[0]), "never backwards"
+    released += [e for _, late in sequencer.pop_late() for _, e in late]
     assert sorted(released) == sorted(due)
     assert sequencer.accepted == len(due)
 
@@ -73,16 +82,30 @@ def test_steps_of_two_cost_one_window_each_and_do_not_add_up() -> None:
     assert max(delays) <= WINDOW + 0.051
 
 
-def test_a_late_scan_goes_out_at_once() -> None:
+def test_a_late_scan_waits_for_its_place() -> None:
     sequencer = _sequencer()
     for seq in (0, 1, 5):
         _arrive(sequencer, "0", seq, 0.0)
     assert sequencer.release(0.0) == [0, 1]
     assert sequencer.release(WINDOW) == [5]
     _arrive(sequencer, "0", 3, 3.0)
-    assert sequencer.release(3.0) == [3]
+    assert sequencer.release(3.0) == []
+    assert (sequencer.held, sequencer.late) == (0, 1)
+    assert sequencer.next_deadline() is None
     _arrive(sequencer, "0", 6, 3.0)
     assert sequencer.release(3.0) == [6]
+    assert [late for _, late in sequencer.pop_late()] == [[(3, 3)]]
+    assert sequencer.late == 0
+
+
+def test_what_an_older_session_has_left_is_late() -> None:
+    sequencer = _sequencer()
+    _arrive(sequencer, "old", 0, 0.0, 100)
+    _arrive(sequencer, "new", 0, 0.0, 200)
+    assert sequencer.release(0.0) == [100, 200]
+    _arrive(sequencer, "old", 1, 0.1, 101)
+    assert sequencer.release(WINDOW) == []
+    assert sequencer.late == 1
 
 
 def test_a_younger_session_waits_for_the_older_ones_gap() -> None:

@@ -18,6 +18,7 @@ from lineloom_service.store.actions import (
     record_skip,
     set_mount,
 )
+from lineloom_service.store.back_fill import place_late
 from lineloom_service.store.choice import database_at
 from lineloom_service.store.files import FileRecord, delete_file, list_files, put_file, read_file
 from lineloom_service.store.reads import read_feed, read_skips
@@ -118,7 +119,13 @@ async def test_a_gap_that_stays_is_passed_after_the_window(store: SqlStore) -> N
     record = await _record(store)
     assert (record.position, record.held) == (3, 0)
     await _post(store, [6])
-    assert [seq for _, _, seq in await _feed(store)] == [0, 5, 7, 6]
+    assert [seq for _, _, seq in await _feed(store)] == [0, 5, 7]
+    late = await _record(store)
+    assert (late.held, late.late) == (1, 1)
+    assert await store.write(place_late, late.id) == 1
+    assert await store.write(place_late, late.id) == 0
+    placed = await _record(store)
+    assert (placed.position, placed.held, placed.late, placed.order) == (5, 0, 0, 5)
 
 
 async def test_held_scans_survive_a_restart(make_store: MakeStore) -> None:

@@ -15,6 +15,7 @@ RETRIED_STATUSES = frozenset(
         HTTPStatus.BAD_GATEWAY,
         HTTPStatus.SERVICE_UNAVAILABLE,
         HTTPStatus.GATEWAY_TIMEOUT,
+        HTTPStatus.INSUFFICIENT_STORAGE,
     }
 )
 """Answers that a later attempt may not get. Every call of the contract may be sent twice."""

@@ -12,7 +12,7 @@ from lineloom.address import is_loopback, service_token, service_url
 from lineloom.calls import Call, Encoding, retry_after
 from lineloom.errors import ConnectionFailedError, NotIdleError
 from lineloom.retry import RetryPolicy
-from lineloom.wire import IngestAnswer, RejectedScan, Site
+from lineloom.wire import IngestAnswer, Site
 
 DEFAULT_BATCH = 200
 """Scans in one POST, where the caller does not say."""
@@ -112,8 +112,7 @@ class BatchTotal:
         """Add an answer; a rejected scan's index becomes its place in the whole list."""
         total = self._answer
         moved = [
-            RejectedScan(index=scan.index + self._sent, seq=scan.seq, reason=scan.reason)
-            for scan in answer.rejected
+            scan.model_copy(update={"index": scan.index + self._sent}) for scan in answer.rejected
         ]
         self._answer = IngestAnswer(
             accepted=total.accepted + answer.accepted,

@@ -25,6 +25,7 @@ from lineloom_core.health.breaks import BreakCheck
 from lineloom_core.health.clock import ClockCheck, FrozenCheck
 from lineloom_core.health.codes import CodeCheck
 from lineloom_core.health.finding import Finding
+from lineloom_core.health.identity import IdentityCheck
 from lineloom_core.health.lengths import LengthCheck
 from lineloom_core.health.no_lines import NoLinesCheck
 from lineloom_core.health.noise import NoiseCheck
@@ -74,6 +75,7 @@ class SensorDoctor:
     lengths: LengthCheck = field(default_factory=LengthCheck)
     breaks: BreakCheck = field(default_factory=BreakCheck)
     no_lines: NoLinesCheck = field(default_factory=NoLinesCheck)
+    identity: IdentityCheck = field(default_factory=IdentityCheck)
     _pose: Pose | None = None
     _track: int | None = None
     _odometry: Pose | None = None
@@ -147,6 +149,7 @@ class SensorDoctor:
             self.lengths,
             self.turning,
             self.bending,
+            self.identity,
             self.breaks,
             self.no_lines,
         )

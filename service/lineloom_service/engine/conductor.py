@@ -50,7 +50,12 @@ class Conductor:
         self._store = store
         self._engine = engine
         self._recorder = recorder
-        pace = Pace(settings.chunk, settings.snapshot_every, settings.snapshot_idle_s)
+        pace = Pace(
+            settings.chunk,
+            settings.snapshot_every,
+            settings.snapshot_idle_s,
+            settings.back_fill_after_s,
+        )
         self._stop_grace_s = settings.stop_grace_s
         self._mode = settings.engine
         self._base = settings.mapper

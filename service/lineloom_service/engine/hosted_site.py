@@ -14,7 +14,8 @@ from dataclasses import dataclass
 
 from lineloom_core.mapping.answers.site_view import SiteView
 
-from lineloom_service.engine.making import Making, former_making
+from lineloom_service.engine.back_fill import BackFill
+from lineloom_service.engine.making import LATE, Making, former_making
 from lineloom_service.engine.protocol import Engine, Recorder, Remade, WorkerDiedError
 from lineloom_service.engine.published import NOTHING, Published
 from lineloom_service.engine.site_runner import Pace, SiteRunner
@@ -38,8 +39,9 @@ class Remaking:
 
 async def remaking_elsewhere(store: Store, record: SiteRecord) -> Remaking | None:
     """Return the same as far as the store has it, for a process that does not map: it is saved."""
-    told = None if record.config is None else await store.read(read_last_events, record.id)
-    ordered = Making.of(record.config)
+    unasked = record.config is None and not record.order
+    told = None if unasked else await store.read(read_last_events, record.id)
+    ordered = Making.of(record)
     if told is None or told.producer == ordered.id:
         return None
     saved = await store.read(saved_position, record.id, ordered.id)
@@ -65,7 +67,7 @@ class HostedSite:
         self.new = new
         self._record = record
         self._means = means
-        self._target = Making.of(record.config)
+        self._target = Making.of(record)
         self._served: SiteRunner | None = None
         self._next: SiteRunner | None = None
         self._former: Published | None = None
@@ -76,6 +78,10 @@ class HostedSite:
         self._generation = 0
         self._tasks: dict[SiteRunner, asyncio.Task[None]] = {}
         self._ending: set[asyncio.Task[None]] = set()
+        self._back_fill = BackFill(
+            means.store, record, means.pace.back_fill_after_s, lambda: self._next is not None
+        )
+        self._back_fill.on_commit(record)
         self._opening = asyncio.create_task(self._open(), name=f"open-{record.name}")
         self._opening.add_done_callback(_report_end)
 
@@ -146,12 +152,13 @@ class HostedSite:
 
     def on_commit(self, record: SiteRecord) -> None:
         """There may be more to feed, and other parameters."""
-        changed = record.config is not self._record.config
+        changed = (record.config, record.order) != (self._record.config, self._record.order)
         self._record = record
         for runner in self._tasks:
             runner.on_commit(record)
         if changed and self._opening.done():
             self._follow()
+        self._back_fill.on_commit(record)
 
     def on_view(self, host: int, position: int, view: SiteView) -> bool:
         """Take what a worker published; True where it is shown."""
@@ -178,6 +185,7 @@ class HostedSite:
     async def end(self) -> list[SiteRunner]:
         """Feed no longer; return those that may still `finish`."""
         self._opening.cancel()
+        await self._back_fill.end()
         for task in self._tasks.values():
             task.cancel()
         await asyncio.gather(self._opening, *self._tasks.values(), return_exceptions=True)
@@ -225,7 +233,7 @@ class HostedSite:
 
     def _follow(self) -> None:
         """Begin to make what the log orders, where that is something new."""
-        target = Making.of(self._record.config)
+        target = Making.of(self._record)
         if target.id == self._target.id:
             return
         why = "" if self._served is None else target.why_not(self._served.making.id)
@@ -242,13 +250,14 @@ class HostedSite:
             self._begin_next(target, why)
 
     def _begin_next(self, target: Making, why: str) -> None:
-        _LOG.warning("site %s: made anew from the first scan, beside its map: %s", self.name, why)
+        _LOG.warning("site %s: its map is made anew, beside the one shown: %s", self.name, why)
         self._why = why
-        self._next = self._run(target, None)
+        self._next = self._run(target, None, self._served if why == LATE else None)
 
     def _is_as_far(self, runner: SiteRunner) -> bool:
         published = runner.published
-        far = max(self.published.position, runner.making.since, self._told)
+        making = runner.making
+        far = max(self.published.position, making.since, making.order, self._told)
         return published is not None and published.position >= far
 
     def _swap(self, runner: SiteRunner) -> None:
@@ -266,11 +275,14 @@ class HostedSite:
             "site %s: the map made anew is shown from entry %d on", self.name, after.position
         )
 
-    def _run(self, making: Making, recorder: Recorder | None) -> SiteRunner:
+    def _run(
+        self, making: Making, recorder: Recorder | None, former: SiteRunner | None = None
+    ) -> SiteRunner:
         means = self._means
         runner = SiteRunner(
             self._record, means.store, means.engine, means.pace, making, recorder,
-            generation=self._generation, on_saved=self._keep_view,
+            generation=self._generation, former=None if former is None else former.making,
+            on_saved=self._keep_view,
         )  # fmt: skip
         self._generation += 1
         task = asyncio.create_task(runner.run(), name=f"site-{self.name}")

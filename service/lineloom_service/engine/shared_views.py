@@ -120,10 +120,15 @@ class SharedViews:
                 if record is not None:
                     reader = self._readers.setdefault(site_id, ViewReader())
                     found = await asyncio.to_thread(reader.read, record)
-                    if known is None or found.rank > known.rank:
+                    # One that was made anew may be no further than the one that it replaces.
+                    if known is None or _order(found) > _order(known):
                         self._views[site_id] = found
             except StoreError:
                 self._wanted.add(site_id)
                 await asyncio.sleep(_AGAIN_S)
             except ValueError as error:  # damaged, or of another version of the service
                 _LOG.warning("site %d: %s; the view before stands", site_id, error)
+
+
+def _order(published: Published) -> tuple[tuple[int, bool], int]:
+    return published.rank, published.view.version

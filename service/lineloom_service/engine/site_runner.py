@@ -22,9 +22,11 @@ from lineloom_service.engine.protocol import (
 )
 from lineloom_service.engine.published import Published
 from lineloom_service.store.actions import record_skip
+from lineloom_service.store.feed_order import FeedOrder, read_order
 from lineloom_service.store.protocol import Store
 from lineloom_service.store.reads import read_feed, read_skips
 from lineloom_service.store.records import (
+    SCANS,
     ChapterLostError,
     LogEntry,
     SiteRecord,
@@ -66,6 +68,7 @@ class Pace:
     chunk: int
     snapshot_every: int
     snapshot_idle_s: float
+    back_fill_after_s: float = 2.0
 
 
 class SiteRunner:
@@ -81,10 +84,14 @@ class SiteRunner:
         recorder: Recorder | None = None,
         *,
         generation: int = 0,
+        former: Making | None = None,
         on_saved: Callable[[SiteRunner], None] = lambda _: None,
     ) -> None:
+        """former: whose snapshots may serve, up to where the order of the feed is another."""
         self._on_saved = on_saved
         self.making = making
+        self._former = former
+        self._order = FeedOrder()
         self.host = host_of(record.id, generation)
         """The engine's number for it."""
         self.site = record.id
@@ -131,8 +138,9 @@ class SiteRunner:
         if self.published is not None and (position, view.settled) < self.published.rank:
             return
         scans = self._marks.get(position, self._scans_done)
-        left_out = tuple(s for _, s in sorted(self.skips.items()) if s.position <= position)
-        skipped = sum(skip.kind == "scan" for skip in left_out)
+        number = self._order.number
+        left_out = tuple(s for _, s in sorted(self.skips.items()) if number(s.position) <= position)
+        skipped = sum(skip.kind in SCANS for skip in left_out)
         self.published = Published(position, scans, skipped, view, left_out)
         self._marks = {at: n for at, n in self._marks.items() if at >= position}
         self._troubles.pop("view", None)
@@ -242,9 +250,12 @@ class SiteRunner:
     async def _resume(self) -> None:
         """Start from the latest snapshot, or from nothing."""
         self._died = False
+        self._order = await self._store.read(read_order, self.site, self.making.order)
         snapshot = await self._store.read(read_snapshot, self.site, self.making.id)
-        self._saved = 0 if snapshot is None else snapshot.position
         self._chapters = 0 if snapshot is None else snapshot.end
+        if snapshot is None and self._former is not None:
+            snapshot = await self._snapshot_of(self._former)
+        self._saved = 0 if snapshot is None else snapshot.position
         self._scans_sent = self._scans_done = 0 if snapshot is None else snapshot.scans
         self._sent = self._done = self._saved
         # What was answered from is recorded or saved, the later of the two; the log has it all.
@@ -261,18 +272,24 @@ class SiteRunner:
                 self.host, self._saved, snapshot.data, chapters, settled=settled
             )
 
+    async def _snapshot_of(self, former: Making) -> SnapshotRecord | None:
+        """Return what another order of the log left, up to where both are the same."""
+        order = await self._store.read(read_order, self.site, former.order)
+        alike = self._order.alike(order)
+        return await self._store.read(read_snapshot, self.site, former.id, alike)
+
     async def _send(self) -> None:
         # The next events go on from the view right there, so that view has to be published.
         short_of = self._recorded - self._sent
         limit = min(self._pace.chunk, short_of) if short_of > 0 else self._pace.chunk
-        entries = await self._store.read(read_feed, self.site, self._sent, limit)
+        entries = await self._store.read(read_feed, self.site, self._sent, limit, self._order)
         if not entries:  # the site was deleted: its runner is about to be stopped
             self._end = self._sent
             return
         wanted: list[LogEntry] = [e for e in entries if self._is_for_it(e)]
         self._troubles.pop("log", None)
-        self._sent = entries[-1].position
-        self._scans_sent += sum(entry.kind == "scan" for entry in wanted)
+        self._sent = self._order.number(entries[-1].position)
+        self._scans_sent += sum(entry.kind in SCANS for entry in wanted)
         self._marks[self._sent] = self._scans_sent
         answer = self._engine.feed(
             self.host,
@@ -286,15 +303,17 @@ class SiteRunner:
 
     def _is_for_it(self, entry: LogEntry) -> bool:
         # What orders another making is not for this one: so the other's version is the greater.
-        later = entry.kind == "config" and entry.position > self.making.since
-        return entry.position not in self.skips and not later
+        making = self.making
+        later = entry.kind == "config" and entry.position > making.since
+        late = entry.kind == "late" and entry.position > making.order
+        return entry.position not in self.skips and not later and not late and entry.kind != "order"
 
     async def _await_one(self) -> None:
         answer, position, scans = self._under_way[0]
         await asyncio.shield(answer)  # a cancelled runner may still `finish`
         self._under_way.popleft()
         self._done, self._scans_done = position, scans
-        for struck in [p for p in self._strikes if p <= position]:
+        for struck in [p for p in self._strikes if self._order.number(p) <= position]:
             del self._strikes[struck]
 
     async def _drain(self) -> None:

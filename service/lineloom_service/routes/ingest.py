@@ -7,7 +7,7 @@ from lineloom import wire
 
 from lineloom_service.answers import answer
 from lineloom_service.dependencies import RobotName, ServiceDep, SiteName
-from lineloom_service.intake import take_in
+from lineloom_service.intake import conflicting, take_in
 from lineloom_service.openapi import body_of
 from lineloom_service.request_body import read_body
 from lineloom_service.store.actions import append_scans
@@ -40,14 +40,17 @@ async def post_scans(
     )
     await service.pacer.turn()  # all that shared the commit come back at once
     service.metrics.count_scans(site, appended.accepted, appended.duplicates)
-    for refused in intake.rejected:
+    batch = isinstance(body.value, dict) and "scans" in body.value
+    rejected = intake.rejected + [conflicting(c, batch=batch) for c in appended.conflicts]
+    service.conflicts.note(appended.site_id, robot, appended.accepted, appended.conflicts)
+    for refused in rejected:
         service.metrics.count_refused_scan(refused.reason.partition(":")[0].partition("/")[0])
     published = service.conductor.published(appended.site_id)
     return answer(
         wire.IngestAnswer(
             accepted=appended.accepted,
             duplicates=appended.duplicates,
-            rejected=intake.rejected,
+            rejected=sorted(rejected, key=lambda refused: refused.index),
             pending=max(0, appended.position - published.position) + appended.held,
         ),
         status=202,

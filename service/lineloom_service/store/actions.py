@@ -13,6 +13,7 @@ from sqlalchemy import Connection, delete, func, insert, select, update
 from lineloom_service.store import tables
 from lineloom_service.store.config_entry import ConfigEntry
 from lineloom_service.store.database import notify
+from lineloom_service.store.identity import sort_out
 from lineloom_service.store.ledger import SiteLedger
 from lineloom_service.store.questions import drop_questions
 from lineloom_service.store.reads import read_skips
@@ -20,6 +21,7 @@ from lineloom_service.store.records import (
     ActionKind,
     Appended,
     BacklogFullError,
+    Conflict,
     EventBatch,
     NewScan,
     Skip,
@@ -44,7 +46,8 @@ def append_scans(
 ) -> Appended:
     """Store scans of one robot, creating site and robot on first use.
 
-    Those that are new, in the order of seq; what need not wait is released.
+    Those that are new, in the order of seq; what need not wait is released. A scan without seq is
+    numbered; one whose seq another scan of its session has is not taken, and told.
     Raises BacklogFullError, taking nothing, where more than `limit` entries wait already, or more
     than `robot_limit` of this robot's (as many as `limit` if None); `processed`: how many of the
     site's released entries the mapper is known to be through.
@@ -56,18 +59,21 @@ def append_scans(
         _check_robot(tx, known_site, robot_name, len(scans), processed, share)
     site = tx.site(site_name)
     robot = tx.robot(site, robot_name)
-    by_session: dict[str, dict[int, NewScan]] = {}
+    by_session: dict[str, list[NewScan]] = {}
     for scan in scans:
-        by_session.setdefault(scan.session, {}).setdefault(scan.seq, scan)
-    accepted = 0
-    for session, by_seq in by_session.items():
+        by_session.setdefault(scan.session, []).append(scan)
+    accepted = duplicates = 0
+    conflicts: list[Conflict] = []
+    for session, sent in by_session.items():
         stream = tx.stream(robot, session)
-        known = tx.known(stream, list(by_seq))
-        for seq in sorted(by_seq.keys() - known):
-            tx.add_scan(site, robot, stream, by_seq[seq])
-            accepted += 1
+        found = sort_out(tx, stream, sent)
+        for new in found.new:
+            tx.add_scan(site, robot, stream, new)
+        accepted += len(found.new)
+        duplicates += found.duplicates
+        conflicts += found.conflicts
     tx.release_scans(site, robot)
-    return Appended(accepted, len(scans) - accepted, site.id, site.position, site.held)
+    return Appended(accepted, duplicates, site.id, site.position, site.held, tuple(conflicts))
 
 
 def _check_backlog(site: SiteLedger, coming: int, processed: int, limit: int) -> None:
@@ -116,6 +122,8 @@ def forget_robot(tx: Transaction, site_name: str, robot_name: str) -> bool:
     if site is None or robot is None:
         return False
     tx.release_scans(site, robot, all_held=True)
+    for _, late in robot.order.pop_late():  # wherever they belong, they go with the robot
+        tx.append_late(site, [entry for _, entry in late], in_order=False)
     tx.add_control(site, robot, "forget", None)
     tx.connection.execute(
         update(tables.robots).where(tables.robots.c.id == robot.id).values(forgotten=True)

@@ -15,6 +15,7 @@ from sqlalchemy import Connection, select
 from lineloom_service.store import tables
 from lineloom_service.store.actions import release_due
 from lineloom_service.store.database import Database, notify
+from lineloom_service.store.failure import failure_of
 from lineloom_service.store.ledger import Ledger
 from lineloom_service.store.protocol import CommitListener
 from lineloom_service.store.records import BacklogFullError, SiteRecord, StoreError
@@ -129,7 +130,7 @@ class GroupCommit:
             except Exception as error:
                 _LOG.exception("nothing was committed")
                 self._deadline = time.monotonic() + _RETRY_S
-                failure = StoreError(f"the storage failed: {type(error).__name__}")
+                failure = failure_of(error)
                 outcome = _Outcome([failure] * len(jobs), [], self._deadline, failed=error)
             if outcome.failed is not None:
                 self.failure = Failure(time.monotonic(), told_plainly(outcome.failed))
@@ -174,7 +175,7 @@ class GroupCommit:
                 alone = await self._commit_together([action])
             except Exception as error:
                 self._distrust_ledger()
-                outcome.results.append(StoreError(f"the storage failed: {type(error).__name__}"))
+                outcome.results.append(failure_of(error))
                 outcome.failed = error
             else:
                 outcome.results += alone.results

@@ -13,6 +13,7 @@ from sqlalchemy import Connection, Select, select
 
 from lineloom_service.store import tables
 from lineloom_service.store.config_entry import OWN_ROBOT, ConfigEntry
+from lineloom_service.store.feed_order import ORDER_ROBOT, parted
 from lineloom_service.store.records import RobotRecord, SiteRecord
 from lineloom_service.store.sequencer import Sequencer, Stream
 
@@ -28,7 +29,8 @@ class RobotLedger:
 
     def record(self) -> RobotRecord:
         """Return what others may know."""
-        return RobotRecord(self.name, self.order.accepted, self.order.held, self.mount)
+        order = self.order
+        return RobotRecord(self.name, order.accepted, order.held, self.mount, order.late)
 
 
 @dataclass(slots=True)
@@ -36,8 +38,10 @@ class SiteLedger:
     """A site: `position` is that of the entry released last.
 
     accepted: scans ever taken, those of robots since forgotten included: they stay in the log.
-    held: those of them that wait. config: what its map is made with; own: the robot that such
-    entries belong to. changed: robots whose record is out of date.
+    held: those of them that wait, the `late` ones among them. config: what its map is made with;
+    own: the robot that such entries belong to. order: position of the entry that gave late scans
+    their places last; places: the robot that such entries belong to. changed: robots whose record
+    is out of date.
     """
 
     id: int
@@ -46,8 +50,11 @@ class SiteLedger:
     accepted: int = 0
     held: int = 0
     robots: dict[str, RobotLedger] = field(default_factory=dict)
+    late: int = 0
     config: ConfigEntry | None = None
     own: RobotLedger | None = None
+    order: int = 0
+    places: RobotLedger | None = None
     changed: set[str] = field(default_factory=set)
     _records: dict[str, RobotRecord] = field(default_factory=dict)
 
@@ -70,7 +77,14 @@ class SiteLedger:
             robots=self._records,
             config=self.config,
             deleted=deleted,
+            late=self.late,
+            order=self.order,
         )
+
+    def is_in_force(self, producer: str) -> bool:
+        """Whether what the log orders makes this producer's map (`engine.making.Making.id`)."""
+        made, order = parted(producer)
+        return order == self.order and (self.config is None or made == self.config.making)
 
 
 @dataclass(slots=True)
@@ -160,8 +174,12 @@ def _read_robots(
         if row.name == OWN_ROBOT:
             site.own = RobotLedger(row.id, row.name, order)
             site.config = None if row.mount is None else ConfigEntry.decode(row.mount)
+        elif row.name == ORDER_ROBOT:
+            site.places = RobotLedger(row.id, row.name, order)
+            site.order = int(row.mount or b"0")
         elif not row.forgotten:
-            site.held += order.held
+            site.held += order.held + order.late
+            site.late += order.late
             site.robots[row.name] = RobotLedger(row.id, row.name, order, row.mount)
             site.changed.add(row.name)
 
@@ -183,6 +201,11 @@ def _read_streams(
         .where(entries.site_id.in_(sites), entries.position.is_(None))
         .order_by(entries.id)
     )
+    orders = {
+        stream.id: Sequencer(0.0, 0, robot) for robot in by_robot.values() for stream in robot
+    }
     for row in connection.execute(held):
-        by_id[row.stream_id].held[row.seq] = (row.id, arrived.get(row.id, now))
+        stream = by_id[row.stream_id]
+        late = orders[stream.id].is_late(stream, row.seq)
+        stream.keep(row.seq, row.id, arrived.get(row.id, now), late=late)
     return by_robot

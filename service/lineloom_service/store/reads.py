@@ -5,6 +5,7 @@ from __future__ import annotations
 from sqlalchemy import Connection, select
 
 from lineloom_service.store import tables
+from lineloom_service.store.feed_order import FeedOrder
 from lineloom_service.store.records import EventBatch, LogEntry, Skip, ViewRecord
 
 
@@ -20,18 +21,30 @@ def read_term(connection: Connection) -> int:
     return term
 
 
-def read_feed(connection: Connection, site_id: int, after: int, limit: int) -> list[LogEntry]:
-    """Return released entries after a position, in the order of the feed."""
+def read_feed(
+    connection: Connection, site_id: int, after: int, limit: int, order: FeedOrder | None = None
+) -> list[LogEntry]:
+    """Return what is fed after the first `after` released entries.
+
+    order: of the feed, None: that of the log. One answer does not go across the entry that made it.
+    """
     e = tables.entries.c
     query = (
         select(e.position, e.kind, tables.robots.c.name, tables.streams.c.session, e.seq, e.body)
         .join_from(tables.entries, tables.robots, tables.robots.c.id == e.robot_id)
         .outerjoin(tables.streams, tables.streams.c.id == e.stream_id)
-        .where(e.site_id == site_id, e.position > after)
-        .order_by(e.position)
-        .limit(limit)
+        .where(e.site_id == site_id)
     )
-    return [LogEntry(*row) for row in connection.execute(query)]
+    if order is None or after >= order.position:
+        query = query.where(e.position > after).order_by(e.position).limit(limit)
+        return [LogEntry(*row) for row in connection.execute(query)]
+    wanted: list[int] = order.feed(after, limit).tolist()
+    found: dict[int, LogEntry] = {}
+    # In portions: a database takes a limited number of parameters in a statement.
+    for start in range(0, len(wanted), 500):
+        portion = query.where(e.position.in_(wanted[start : start + 500]))
+        found.update((row.position, LogEntry(*row)) for row in connection.execute(portion))
+    return [found[position] for position in wanted if position in found]
 
 
 def read_skips(connection: Connection, site_id: int, position: int | None = None) -> list[Skip]:

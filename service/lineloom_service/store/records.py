@@ -9,18 +9,28 @@ from lineloom_core.codec import storable
 
 from lineloom_service.store.config_entry import ConfigEntry
 
-EntryKind = Literal["scan", "mount", "forget", "retract", "restore", "config"]
+EntryKind = Literal["scan", "late", "mount", "forget", "retract", "restore", "config", "order"]
+"""late: a scan that came after its successors; the next `order` says where it belongs
+(`store.feed_order`)."""
+SCANS: frozenset[EntryKind] = frozenset({"scan", "late"})
+
 ActionKind = Literal["retract", "restore"]
 """What an operator can do to a constraint; the entry's body is what it claims (`store.codec`)."""
 
 
 @dataclass(frozen=True, slots=True)
 class NewScan:
-    """A scan to be stored. body: as `store.codec` encodes it."""
+    """A scan to be stored. body: as `store.codec` encodes it.
+
+    seq: None where the service is to number it, by `stamp` and arrival. index: its place in the
+    request.
+    """
 
     session: str
-    seq: int
+    seq: int | None
     body: bytes
+    stamp: float = 0.0
+    index: int = 0
 
 
 @storable("log-entry")
@@ -38,12 +48,16 @@ class LogEntry:
 
 @dataclass(frozen=True, slots=True)
 class RobotRecord:
-    """accepted: its durable scans. held: those of them that wait for a gap in seq to fill."""
+    """accepted: its durable scans. held: those of them that wait for a gap in seq to fill.
+
+    late: those that came after their successors, and are about to be given their place.
+    """
 
     name: str
     accepted: int
     held: int
     mount: bytes | None
+    late: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +65,10 @@ class SiteRecord:
     """A site as of the last commit.
 
     id: never used again, also when a deleted site's name is. position: entries released to the
-    mapper so far, 1..position without holes. held: scans accepted, but not yet released.
-    config: what its map is made with, None for the defaults. deleted: it is gone, and nothing else
-    here means anything.
+    mapper so far, 1..position without holes. held: scans accepted, but not yet released; late:
+    those of them that came after their successors. config: what its map is made with, None for the
+    defaults. order: position of the entry that last gave late scans their places, 0: none did.
+    deleted: it is gone, and nothing else here means anything.
     """
 
     id: int
@@ -64,6 +79,22 @@ class SiteRecord:
     robots: dict[str, RobotRecord] = field(default_factory=dict)
     config: ConfigEntry | None = None
     deleted: bool = False
+    late: int = 0
+    order: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Conflict:
+    """A scan that was not taken: its session has another one of this seq. index: in the request.
+
+    stamp, known: its own and the other's time [s].
+    """
+
+    index: int
+    session: str
+    seq: int
+    stamp: float
+    known: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +106,7 @@ class Appended:
     site_id: int
     position: int
     held: int
+    conflicts: tuple[Conflict, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,3 +187,7 @@ class ChapterLostError(Exception):
 
 class StoreError(Exception):
     """The storage failed: nothing of the request was taken. The text is safe to show."""
+
+
+class StorageFullError(StoreError):
+    """There is no room for it."""

@@ -3,13 +3,15 @@
 A scan is released when it is the next of its session (the first expected is 0), else held until
 the gap before it fills or it has waited for the gap window. Sessions go in the order first seen:
 a younger one waits while an older one still holds scans, and never longer than the window. A scan
-that arrives after its successors were released goes out at once: late is better than never.
+that arrives after its successors were released is late: it is kept apart until `place_late` gives
+all of them the places that they should have had.
 
 Pure and without a clock of its own: `now` is given, ids are the caller's.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
@@ -19,7 +21,8 @@ class Stream:
     """One session of one robot.
 
     released: the greatest seq released so far, None before the first. highest: the greatest seq
-    ever accepted. held: seq -> (entry id, time of arrival), in order of arrival.
+    ever accepted. held: seq -> (entry id, time of arrival), in order of arrival. late: seq -> entry
+    id. contents: of the scans that were numbered here lately, digest -> seq; None: not read yet.
     """
 
     id: int
@@ -28,21 +31,30 @@ class Stream:
     highest: int = -1
     accepted: int = 0
     held: dict[int, tuple[int, float]] = field(default_factory=dict)
+    late: dict[int, int] = field(default_factory=dict)
+    contents: dict[bytes, int] | None = None
 
     @property
     def expected(self) -> int:
         """The seq that may go out without waiting."""
         return 0 if self.released is None else self.released + 1
 
-    def hold(self, seq: int, entry: int, now: float) -> None:
+    def hold(self, seq: int, entry: int, now: float, *, late: bool) -> None:
         """Take in a new scan."""
-        self.held[seq] = (entry, now)
+        self.keep(seq, entry, now, late=late)
         self.highest = max(self.highest, seq)
         self.accepted += 1
 
+    def keep(self, seq: int, entry: int, now: float, *, late: bool) -> None:
+        """Have a scan wait."""
+        if late:
+            self.late[seq] = entry
+        else:
+            self.held[seq] = (entry, now)
+
     def pop_ready(self) -> list[int]:
-        """Release the late ones, then everything from the expected seq on without a gap."""
-        released = self.pop_up_to(self.expected - 1)
+        """Release everything from the expected seq on without a gap."""
+        released: list[int] = []
         while (seq := self.expected) in self.held:
             released.append(self.held.pop(seq)[0])
             self.released = seq
@@ -80,8 +92,20 @@ class Sequencer:
 
     @property
     def held(self) -> int:
-        """How many scans wait."""
+        """How many scans wait for those before them."""
         return sum(len(stream.held) for stream in self.streams.values())
+
+    @property
+    def late(self) -> int:
+        """How many scans came after their successors were released."""
+        return sum(len(stream.late) for stream in self.streams.values())
+
+    def is_late(self, stream: Stream, seq: int) -> bool:
+        """Whether scans that come after this one have gone out: of its session or a younger one."""
+        if stream.released is not None and seq <= stream.released:
+            return True
+        younger = itertools.dropwhile(lambda s: s is not stream, self.streams.values())
+        return any(s.released is not None for s in younger if s is not stream)
 
     @property
     def accepted(self) -> int:
@@ -103,11 +127,18 @@ class Sequencer:
         return released
 
     def flush(self) -> list[int]:
-        """Release everything, gaps or not."""
+        """Release everything that is not late, gaps or not."""
         released: list[int] = []
         for stream in self.streams.values():
             released += stream.pop_up_to(stream.highest)
         return released
+
+    def pop_late(self) -> list[tuple[Stream, list[tuple[int, int]]]]:
+        """Give the late ones away: by session, seq and entry id in the order of seq."""
+        found = [(s, sorted(s.late.items())) for s in self.streams.values() if s.late]
+        for stream, _ in found:
+            stream.late = {}
+        return found
 
     def next_deadline(self) -> float | None:
         """When the longest waiting scan must go out; None when none waits."""

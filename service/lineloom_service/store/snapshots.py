@@ -30,7 +30,7 @@ def save_snapshot(tx: Transaction, site_id: int, snapshot: SnapshotRecord) -> No
     site = next((site for site in tx.ledger.sites.values() if site.id == site_id), None)
     if site is None:
         return
-    is_last = site.config is None or site.config.making == snapshot.producer
+    is_last = site.is_in_force(snapshot.producer)
     connection = tx.connection
     c = tables.snapshots.c
     connection.execute(
@@ -67,8 +67,13 @@ def drop_snapshot(tx: Transaction, site_id: int, position: int) -> None:
     _prune_chapters(tx.connection, site_id)
 
 
-def read_snapshot(connection: Connection, site_id: int, producer: str) -> SnapshotRecord | None:
-    """Return the newest snapshot that `producer` wrote, without chapters."""
+def read_snapshot(
+    connection: Connection, site_id: int, producer: str, up_to: int | None = None
+) -> SnapshotRecord | None:
+    """Return the newest snapshot that `producer` wrote, without chapters.
+
+    up_to: of those up to this position.
+    """
     c = tables.snapshots.c
     query = (
         select(c.position, c.scans, c.producer, c.data, c.chapters)
@@ -76,6 +81,8 @@ def read_snapshot(connection: Connection, site_id: int, producer: str) -> Snapsh
         .order_by(c.position.desc())
         .limit(1)
     )
+    if up_to is not None:
+        query = query.where(c.position <= up_to)
     row = connection.execute(query).first()
     return None if row is None else SnapshotRecord(*row)
 

@@ -14,6 +14,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from lineloom_service.store.actions import begin_term, purge_portion
 from lineloom_service.store.database import Claim, Database
+from lineloom_service.store.failure import failure_of
 from lineloom_service.store.group_commit import GroupCommit
 from lineloom_service.store.ledger import Ledger
 from lineloom_service.store.protocol import NEWS, CommitListener, NewsListener
@@ -207,7 +208,7 @@ async def _guarded(result: Awaitable[T]) -> T:
         return await result
     except (SQLAlchemyError, OSError) as error:
         _LOG.exception("the database failed")
-        raise StoreError(f"the storage failed: {type(error).__name__}") from error
+        raise failure_of(error) from error
 
 
 def _check_term(current: int, mine: int) -> None:

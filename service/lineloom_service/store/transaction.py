@@ -10,6 +10,7 @@ from sqlalchemy import Connection, bindparam, func, insert, select, update
 
 from lineloom_service.store import tables
 from lineloom_service.store.config_entry import OWN_ROBOT, ConfigEntry
+from lineloom_service.store.feed_order import ORDER_ROBOT, Place, encode_order
 from lineloom_service.store.ledger import Ledger, RobotLedger, SiteLedger
 from lineloom_service.store.records import EntryKind, NewScan
 from lineloom_service.store.sequencer import Sequencer, Stream
@@ -17,7 +18,7 @@ from lineloom_service.store.sequencer import Sequencer, Stream
 _PLACE_ENTRY = (
     update(tables.entries)
     .where(tables.entries.c.id == bindparam("entry"))
-    .values(position=bindparam("place"))
+    .values(position=bindparam("place"), kind=bindparam("as_kind"))
 )
 _UPDATE_STREAM = (
     update(tables.streams)
@@ -52,7 +53,8 @@ class Transaction:
         self._counted_on = False
         self._released: dict[int, int] = {}
         self._new: dict[int, dict[str, Any]] = {}
-        self._placed: list[dict[str, int]] = []
+        self._placed: list[dict[str, int | str]] = []
+        self._late: set[int] = set()
         self._streams: dict[int, Stream] = {}
 
     def site(self, name: str) -> SiteLedger:
@@ -87,13 +89,16 @@ class Transaction:
         return stream
 
     def add_scan(self, site: SiteLedger, robot: RobotLedger, stream: Stream, scan: NewScan) -> None:
-        """Store a scan that is new; it has no place in the feed yet."""
+        """Store a scan that is new and has its seq; it has no place in the feed yet."""
+        assert scan.seq is not None
         entry = self._add_entry(
             site, robot, "scan", stream_id=stream.id, seq=scan.seq, body=scan.body
         )
-        stream.hold(scan.seq, entry, self.now)
+        late = robot.order.is_late(stream, scan.seq)
+        stream.hold(scan.seq, entry, self.now, late=late)
         site.accepted += 1
         site.held += 1
+        site.late += late
         self._streams[stream.id] = stream
 
     def add_control(
@@ -138,19 +143,52 @@ class Transaction:
         else:
             self.ledger.waiting.pop(robot.id, None)
 
-    def known(self, stream: Stream, seqs: Sequence[int]) -> set[int]:
-        """Return those of `seqs` that the stream has already."""
+    def append_late(self, site: SiteLedger, entries: Sequence[int], *, in_order: bool) -> list[int]:
+        """Put scans that came late at the end of the log; return their positions there.
+
+        in_order: an `order` that follows says where they belong; else they stay there.
+        """
+        begin = site.position
+        if in_order:
+            self._late.update(entries)
+        self._place(site, entries)
+        site.held -= len(entries)
+        site.late -= len(entries)
+        return list(range(begin + 1, site.position + 1))
+
+    def add_order(self, site: SiteLedger, places: Sequence[Place]) -> None:
+        """Log where the late scans before it belong; it is released at once."""
+        if site.places is None:
+            number = self._insert(tables.robots, site_id=site.id, name=ORDER_ROBOT, forgotten=True)
+            order = Sequencer(self.ledger.window_s, self.ledger.max_held)
+            site.places = RobotLedger(number, ORDER_ROBOT, order)
+        self.add_control(site, site.places, "order", encode_order(site.order, places))
+        site.order = site.position
+        row = tables.robots.c.id == site.places.id
+        last = str(site.order).encode()
+        self.connection.execute(update(tables.robots).where(row).values(mount=last))
+
+    def known(self, stream: Stream, seqs: Sequence[int]) -> dict[int, bytes]:
+        """Return the scans of these `seqs` that the stream has already, as they are stored."""
         doubtful = [seq for seq in seqs if seq <= stream.highest]
-        found: set[int] = set()
+        found: dict[int, bytes] = {}
         if doubtful:
             self.flush()
             c = tables.entries.c
             # In portions: a database takes a limited number of parameters in a statement.
             for start in range(0, len(doubtful), 500):
                 portion = doubtful[start : start + 500]
-                query = select(c.seq).where(c.stream_id == stream.id, c.seq.in_(portion))
-                found.update(self.connection.execute(query).scalars())
+                query = select(c.seq, c.body).where(c.stream_id == stream.id, c.seq.in_(portion))
+                found.update((row.seq, row.body) for row in self.connection.execute(query))
         return found
+
+    def latest(self, stream: Stream, limit: int) -> list[tuple[int, bytes]]:
+        """Return the seqs and bodies of the scans with the highest seqs, in the order of seq."""
+        self.flush()
+        c = tables.entries.c
+        query = select(c.seq, c.body).where(c.stream_id == stream.id)
+        rows = self.connection.execute(query.order_by(c.seq.desc()).limit(limit))
+        return [(row.seq, row.body) for row in rows][::-1]
 
     def remove_site(self, site: SiteLedger) -> None:
         """Forget a site. Its rows go later, in portions that block nobody."""
@@ -215,10 +253,14 @@ class Transaction:
     def _place(self, site: SiteLedger, entries: Iterable[int]) -> None:
         for entry in entries:
             site.position += 1
+            kind = "late" if entry in self._late else None
             if entry in self._new:
                 self._new[entry]["position"] = site.position
+                self._new[entry]["kind"] = kind or self._new[entry]["kind"]
             else:
-                self._placed.append({"entry": entry, "place": site.position})
+                # Only scans are placed after the commit that brought them.
+                where = {"entry": entry, "place": site.position}
+                self._placed.append({**where, "as_kind": kind or "scan"})
         self.touched[site.id] = site
 
     def _insert(self, table: Any, **values: object) -> int:

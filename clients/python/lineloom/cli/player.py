@@ -79,7 +79,9 @@ class Player:
         played.accepted += answer.accepted
         played.duplicates += answer.duplicates
         played.rejected += [
-            f"{robot} seq {refusal.seq}: {refusal.reason}" for refusal in answer.rejected
+            f"{robot} seq {refusal.seq}: {refusal.reason}"
+            + (f": {refusal.detail}" if refusal.detail else "")
+            for refusal in answer.rejected
         ]
         if self._on_sent is not None:
             self._on_sent(played)

@@ -73,7 +73,9 @@ def _streams(path: Path, robot: str | None) -> list[Stream]:
         if scan.session == "0":
             scan = to_wire(scan, session=session)
         several = several or found.robot is not None
-        scans.setdefault(found.robot or own, []).append(scan)
+        part = scans.setdefault(found.robot or own, [])
+        # By its place in the file: played again, it is the same scan.
+        part.append(scan if scan.seq is not None else to_wire(scan, seq=len(part)))
     if not scans:
         names = [known.name for known in LOG_FORMATS.values()]
         raise CommandError(f"{path} holds no scans: is it a log of {', '.join(names)} or a bag?")

@@ -53,7 +53,7 @@ def _core_scan(scan: Scan) -> CoreScan:
         range_min=scan.range_min,
         range_max=scan.range_max,
         stamp=scan.stamp,
-        seq=scan.seq,
+        seq=scan.seq or 0,
         session=scan.session,
         time_increment=scan.time_increment,
         scan_time=scan.scan_time,

@@ -99,7 +99,9 @@ class Outbox:
             # A driver that leaves the default and counts from 0 at every start would otherwise
             # have its scans of today taken for those of yesterday.
             session = self.session if fields.get("session", "0") == "0" else fields["session"]
-            seq = fields.get("seq", self._queue.next_seq(session))
+            seq = fields.get("seq")
+            if seq is None:
+                seq = self._queue.next_seq(session)
             self._queue.append(to_wire(fields, session=session, seq=seq))
         self._wake.set()
         return int(seq)

@@ -15,17 +15,24 @@ class ScanBatch(Request):
 
 
 class RejectedScan(Answer):
-    """A scan of a batch that was refused: its place in the batch and why."""
+    """A scan that was refused: its place in the request and why.
+
+    reason: `conflict` where its session has another scan of this seq; else which field is wrong,
+    and how. pointer: JSON pointer to it. detail: in words, what to do.
+    """
 
     index: int
     seq: int | None = None
     reason: str
+    pointer: str = ""
+    detail: str = ""
 
 
 class IngestAnswer(Answer):
     """What 202 says: everything accepted is on disk.
 
-    duplicates: scans that were there before (same session and seq); sending again is harmless.
+    duplicates: scans that were there before (same session, seq and content); sending again is
+    harmless. Without seq those are meant that were there with the same content.
     pending: scans of the site accepted and not yet in the map.
     """
 

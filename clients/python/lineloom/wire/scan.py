@@ -139,8 +139,10 @@ class Odometry(Request):
 class Scan(Request):
     """One sweep, in the laser's frame; SI units and radians."""
 
-    seq: Seq = Field(
-        description="The client's counter; with `session` the idempotency key.",
+    seq: Seq | None = Field(
+        default=None,
+        description="The client's counter; with `session` the idempotency key. Left out, the "
+        "service numbers by stamp and arrival within the session.",
     )
     session: str = Field(
         default="0",
