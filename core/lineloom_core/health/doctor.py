@@ -38,7 +38,8 @@ from lineloom_core.scan import Scan
 
 _DEAF = {"units", "random", "frozen", "stuck", "constant", "no-returns", "angle-increment"}
 _EXPLAINED_BY = {
-    "breaks": {*_DEAF, "clock-jump"},
+    "breaks": {*_DEAF, "clock-jump", "two-sources"},
+    "two-sources": _DEAF,
     "no-lines": _DEAF,
     "rides-along": {"self-hits"},
     "turn-scale": {"angle-increment"},

@@ -30,6 +30,11 @@ class StaticTransforms:
         """Take T_parent_child; the last one counts."""
         self._parents[child] = (parent, _matrix(transform))
 
+    @property
+    def frames(self) -> set[str]:
+        """All frames that some transform names."""
+        return set(self._parents) | {parent for parent, _ in self._parents.values()}
+
     def mount(self, base: str, laser: str) -> Mount | None:
         """Return the laser's place on the base; None where no chain of transforms leads there.
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from lineloom.cli.console import note
 from lineloom.cli.failure import CommandError, Exit
-from lineloom.cli.scan_files import LOG_FORMATS, read_scans
+from lineloom.cli.scan_files import formats, read_scans
 from lineloom.cli.schedule import Stream, robot_name, split
 from lineloom.scan_like import to_wire
 from lineloom.wire import MountSettings, Scan
@@ -27,7 +27,7 @@ class BagChoice:
     """What to take from bags: see `lineloom_core.io.rosbag.BagOptions`."""
 
     topics: tuple[str, ...] = ()
-    base_frame: str = "base_link"
+    base_frame: str | None = None
     odom_frame: str = "odom"
     odometry_topic: str | None = None
 
@@ -77,8 +77,7 @@ def _streams(path: Path, robot: str | None) -> list[Stream]:
         # By its place in the file: played again, it is the same scan.
         part.append(scan if scan.seq is not None else to_wire(scan, seq=len(part)))
     if not scans:
-        names = [known.name for known in LOG_FORMATS.values()]
-        raise CommandError(f"{path} holds no scans: is it a log of {', '.join(names)} or a bag?")
+        raise CommandError(f"{path} holds no scans that are known. Read are {formats()}")
     if robot is not None and several:
         # The log's own names would be lost: they become endings.
         return [Stream(f"{robot}-{name}", list(part)) for name, part in scans.items()]
@@ -94,6 +93,8 @@ def _bag_streams(path: Path, robot: str | None, choice: BagChoice) -> list[Strea
     for found in robots:
         for reason in found.refused[:3]:
             note(f"{path}: left out: {reason}")
+        if len(found.refused) > 3:
+            note(f"{path}: left out: {len(found.refused) - 3} more")
         if not found.scans:
             note(f"{path}: {found.topic} holds no scan that can be used")
             continue
@@ -119,7 +120,7 @@ def _read_bag(path: Path, choice: BagChoice) -> tuple[BagRobot, ...]:
     if not path.exists():
         raise CommandError(f"{path}: No such file or directory")
     if not is_bag(path):
-        raise CommandError(f"{path} is a folder, but no bag of ROS 2: it has no metadata.yaml")
+        raise CommandError(f"{path} is a folder, but no bag of ROS 2: it has no .mcap or .db3")
     try:
         return read_bag(path, _options(choice))
     except (RosbagError, TiltedLidarError) as error:

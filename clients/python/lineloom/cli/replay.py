@@ -18,7 +18,8 @@ Logs = Annotated[
     typer.Argument(
         metavar="LOG…",
         help="CARMEN logs (.log, .clf, also .gz), ROS bags (.bag, .mcap, .db3 or a folder), "
-        "tinySLAM logs (.dat) and JSON lines (.jsonl).",
+        "tinySLAM (.dat) and DP-SLAM logs, JSON lines (.jsonl), numpy (.npz) and what "
+        "`rostopic echo -p` wrote (.csv).",
     ),
 ]
 SplitInto = Annotated[
@@ -40,7 +41,10 @@ Topic = Annotated[
     ),
 ]
 BaseFrame = Annotated[
-    str, typer.Option(metavar="FRAME", help="The robot's frame in a bag's transforms.")
+    str | None,
+    typer.Option(
+        metavar="FRAME", help="The robot's frame in a bag's transforms; else base_link, if any."
+    ),
 ]
 OdomFrame = Annotated[
     str, typer.Option(metavar="FRAME", help="The odometry's frame in a bag's transforms.")
@@ -58,7 +62,7 @@ def replay(
     robot: Robot = None,
     no_odometry: NoOdometry = False,
     topic: Topic = None,
-    base_frame: BaseFrame = "base_link",
+    base_frame: BaseFrame = None,
     odom_frame: OdomFrame = "odom",
     odom_topic: OdomTopic = None,
     speed: options.Speed = None,

@@ -19,6 +19,25 @@ _JSON_SUFFIXES = frozenset({".jsonl", ".ndjson", ".json"})
 _ADDRESSED = re.compile(r"^(?P<path>.+):(?P<line>[0-9]+)$")
 
 
+_TABLE = (
+    "a table of numbers does not say what its columns are: save it with numpy as .npz, with "
+    "ranges, stamps, angle_min, angle_increment and range_max (core/docs/formats.md)"
+)
+_NOT_READ = {
+    ".rawlog": "rawlogs of MRPT are not read: `rawlog-edit --export-2d-scans-txt` makes tables of "
+    "them, and numpy an .npz of those",
+    ".txt": _TABLE,
+    ".tsv": _TABLE,
+    ".xz": "it is compressed: unpack it first",
+    ".bz2": "it is compressed: unpack it first",
+    ".zip": "it is an archive: unpack it first",
+    ".tar": "it is an archive: unpack it first",
+    ".pcap": "packets of a lidar are not read: record the scans with its driver",
+    ".pcd": "point clouds are not read: record the scans of the lidar itself",
+}
+"""What people have and is not read, by the end of its name: what to do next."""
+
+
 @dataclass(frozen=True, slots=True)
 class FileScan:
     """A scan of a file, the line it is on (0 where there are no lines), and whose it is where the
@@ -41,8 +60,26 @@ class LogFormat:
 def read_scans(path: Path) -> Iterator[FileScan]:
     """Yield the scans of a file; its name tells the format. Broken lines end the command."""
     *others, last = LOG_FORMATS.values()
+    named = path.name.lower().removesuffix(".gz")
+    for suffix, next_step in _NOT_READ.items():
+        if named.endswith(suffix):
+            raise CommandError(f"{path}: {next_step}. Read are {formats()}")
     fitting = (f for f in others if path.suffix.lower() in f.suffixes)
-    return next(fitting, last).read(path)
+    chosen = next(fitting, last)
+    if chosen is last and _is_dpslam(path):
+        chosen = LOG_FORMATS["dpslam"]
+    return chosen.read(path)
+
+
+def formats() -> str:
+    """Return what can be read, for people."""
+    return ", ".join(known.name for known in LOG_FORMATS.values()) + ", ROS bags and MCAP"
+
+
+def _is_dpslam(path: Path) -> bool:
+    """Whether a log with CARMEN's ending is one of DP-SLAM: they have the same."""
+    with path.open("rb") as file:
+        return file.read(1024).lstrip().startswith((b"Odometry ", b"Laser "))
 
 
 def read_one(reference: str) -> FileScan:
@@ -120,6 +157,11 @@ def _log(module: str, name: str, path: Path) -> Iterator[FileScan]:
 
 LOG_FORMATS: Mapping[str, LogFormat] = {
     "jsonl": LogFormat("JSON lines", _JSON_SUFFIXES, partial(_json_lines, for_matching=False)),
+    "npz": LogFormat("numpy (.npz)", frozenset({".npz"}), partial(_log, "npz", "numpy")),
+    "rostopic": LogFormat(
+        "`rostopic echo -p`", frozenset({".csv"}), partial(_log, "rostopic", "CSV")
+    ),
+    "dpslam": LogFormat("DP-SLAM", frozenset({".dpslam"}), partial(_log, "dpslam", "DP-SLAM")),
     "tinyslam": LogFormat("tinySLAM", frozenset({".dat"}), partial(_log, "tinyslam", "tinySLAM")),
     "carmen": LogFormat("CARMEN", frozenset(), partial(_log, "carmen", "CARMEN")),
 }
