@@ -78,3 +78,30 @@ def test_what_is_no_recording_is_told(tmp_path: Path) -> None:
     broken = tmp_path / "broken.bag"
     broken.write_bytes(b"nothing")
     assert "not a bag that can be read" in one_line(run("replay", broken), 1)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "next_step"),
+    [
+        ("run.rawlog", "", "rawlog-edit"),
+        ("run.rawlog.gz", "", "rawlog-edit"),
+        ("run.txt", "# stamp r0 r1\n0.0 1.0 2.0\n", "save it with numpy as .npz"),
+        ("run.zip", "", "unpack it first"),
+    ],
+)
+def test_what_is_not_read_is_refused_with_the_next_step(
+    name: str, content: str, next_step: str, tmp_path: Path
+) -> None:
+    path = tmp_path / name
+    path.write_text(content)
+    said = one_line(run("replay", path), 1)
+    assert next_step in said
+    assert "Read are JSON lines, numpy (.npz)" in said
+
+
+def test_a_log_is_known_by_what_it_holds(tmp_path: Path, loopback: str, fake: FakeService) -> None:
+    (tmp_path / "a.txt").write_text(CARMEN)
+    (tmp_path / "b.log").write_text("Odometry 0 0 0\nLaser 3 1.0 2.0 3.0\nLaser 3 1.0 2.0 3.1\n")
+    result = run("replay", tmp_path / "a.txt", tmp_path / "b.log", "--url", loopback)
+    assert result.exit_code == 0, result.output
+    assert {robot for _, robot, _, _ in fake.scans} == {"a", "b"}

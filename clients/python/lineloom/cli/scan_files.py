@@ -62,7 +62,7 @@ def read_scans(path: Path) -> Iterator[FileScan]:
     *others, last = LOG_FORMATS.values()
     named = path.name.lower().removesuffix(".gz")
     for suffix, next_step in _NOT_READ.items():
-        if named.endswith(suffix):
+        if named.endswith(suffix) and (next_step != _TABLE or _is_table(path)):
             raise CommandError(f"{path}: {next_step}. Read are {formats()}")
     fitting = (f for f in others if path.suffix.lower() in f.suffixes)
     chosen = next(fitting, last)
@@ -74,6 +74,18 @@ def read_scans(path: Path) -> Iterator[FileScan]:
 def formats() -> str:
     """Return what can be read, for people."""
     return ", ".join(known.name for known in LOG_FORMATS.values()) + ", ROS bags and MCAP"
+
+
+def _is_table(path: Path) -> bool:
+    """Whether a text begins with numbers: CARMEN's logs begin with a word."""
+    with path.open("rb") as file:
+        lines = file.read(1024).decode(errors="replace").splitlines()
+    first = next((line for line in lines if line.strip() and not line.startswith("#")), "")
+    try:
+        float(re.split(r"[\s,;]+", first.strip())[0])
+    except ValueError:
+        return False
+    return True
 
 
 def _is_dpslam(path: Path) -> bool:
