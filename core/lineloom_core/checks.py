@@ -21,6 +21,10 @@ def _beyond_clutter(_: Any, threshold: float, figures: Figures) -> float:
     return threshold + figures["own_conflict"]
 
 
+def _less_objects(_: Any, threshold: float, figures: Figures) -> float:
+    return max(threshold - figures.get("objects", 0.0), 0.0)
+
+
 def _near_window(_: Any, threshold: float, __: Figures) -> float:
     return NEAR_SLACK * threshold
 
@@ -50,6 +54,12 @@ def _conflict_of_step(config: Any, threshold: float, figures: Figures) -> float:
         return float(config.gap_conflict)
     noisy = figures.get("noise", 1.0) > config.noisy_above
     return float(config.noisy_conflict if noisy else threshold)
+
+
+def _cost_of_step(_: Any, threshold: float, figures: Figures) -> float:
+    """After a turn of 45 degrees, what lies half a turn off took no larger one."""
+    near = figures.get("turn", 0.0) < math.pi / 4.0
+    return math.inf if near or figures.get("backed", 0.0) else threshold
 
 
 def _odds(name: str) -> Callable[[Figures], float]:
@@ -85,11 +95,16 @@ TRACKED = Checks("A step from one keyframe to the next", "tracker", (
           adjusted=_lead_of_step,
           told="`gap_lead` after a gap; beyond `farthest_gap` only if the matcher is sure",
           objection="another spot fits almost as well"),
+    Check("cost", "The same, and how unlike the last steps it is", at_most="most_cost",
+          adjusted=_cost_of_step,
+          told="none up to a turn of 45 degrees, or where the pairwise matcher is sure of it",
+          objection="that all it shows is new would be as likely"),
     Check("wall", "Of what it fits", "m", at_least="least_wall",
           objection="it shows too little wall to be known by"),
     Check("surprise", "Unlike the even steps before it", at_most="most_surprise",
           objection="no robot that drove evenly is there at once"),
     Check("backed", "The pairwise matcher is sure of it"),
+    Check("turn", "Turned since the last scan", "rad"),
     Check("gap", "Silence before it, or skipped scans", "intervals"),
     Check("noise", "The robot's noise figure"),
 ))
@@ -108,8 +123,10 @@ NEAR_LOOP = Checks("A near loop", "near_loops", (
 RECOGNISED = Checks("A place recognised in another", "recognition", (
     Check("matched", "Points in common", "points", at_least="least_matched",
           objection="too few points in common"),
-    Check("overlap", "Common wall", "m", at_least="least_overlap",
+    Check("overlap", "Common wall", "m", at_least="least_overlap", adjusted=_less_objects,
+          told="less a metre for each object in common",
           objection="too little common line length"),
+    Check("objects", "Columns and the like in common", "objects"),
     Check("conflict_share", "In free space", "share", at_most="most_conflict",
           adjusted=_beyond_clutter, told="beyond the places' own clutter",
           objection="walls of one place stand in free space of the other"),

@@ -67,6 +67,9 @@ class TrackerConfig:
         0.12, "share", "of all of a searched scan on known surfaces", 0.0, 1.0
     )
     most_misfit: float = parameter(11.0, "", "of a searched scan: see `step_search`")
+    most_cost: float = parameter(
+        12.0, "", "of it and of its surprise after a large turn: see `step_search`"
+    )
     gap_lead: float = parameter(1.5, "", "`least_lead` after a gap")
     most_surprise: float = parameter(
         4.5, "", "of a step after small and even ones: minus its log-likelihood by `motion`"

@@ -26,6 +26,7 @@ from lineloom_core.matching._free_space_kernels import CONFLICT, judge_cloud
 from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
 from lineloom_core.matching.local_map import Cloud, LocalMap, Registration
 from lineloom_core.places import _kernels
+from lineloom_core.places.landmarks import find_landmarks
 
 PLACE_GATE = 0.3
 """How far from where they are expected points may be found in another place [m]."""
@@ -81,6 +82,11 @@ class Body:
     angle_mins: NDArray[np.float64]
     angle_increments: NDArray[np.float64]
     sweep_poses: NDArray[np.float64]
+
+    @cached_property
+    def landmarks(self) -> NDArray[np.float64]:
+        """See `Place.landmarks`."""
+        return find_landmarks(self.surface.points, self.lines, self.ends, self.edges)
 
     @cached_property
     def steady(self) -> NDArray[np.bool_]:
@@ -162,6 +168,11 @@ class Place:
     def sweep_poses(self) -> NDArray[np.float64]:
         """Where the sweeps were taken: x, y, theta, shape (k, 3)."""
         return _body(self).sweep_poses
+
+    @property
+    def landmarks(self) -> NDArray[np.float64]:
+        """Its objects and corners as `find_landmarks` has them, shape (n, 5)."""
+        return _body(self).landmarks
 
     @property
     def steady(self) -> NDArray[np.bool_]:

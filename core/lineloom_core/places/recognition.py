@@ -1,6 +1,7 @@
 """Deciding whether two places are the same, and how they lie to each other.
 
-Steps of `recognise`: 1-6. the default matcher's, on fused lines and many sweeps; 7. dense
+Steps of `recognise`: 1-6. the default matcher's, on fused lines and many sweeps, or, where lines
+have too little in common, by the constellation of objects and corners (`landmarks`); 7. dense
 registration of the best hypotheses; 8. margin to the best rival; 9. the verdict. A verdict of
 "plausible" is a candidate, never yet a join: that takes several that agree (design §7).
 """
@@ -8,6 +9,7 @@ registration of the best hypotheses; 8. margin to the best rival; 9. the verdict
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +21,7 @@ from lineloom_core.graph.observability import observe
 from lineloom_core.matching.free_space import TOLERANCE, TOLERANCE_SLOPE
 from lineloom_core.matching.local_map import Registration
 from lineloom_core.parameters import parameter
-from lineloom_core.places import _kernels
+from lineloom_core.places import _constellation_kernels, _kernels
 from lineloom_core.places.place import Place, count_points, count_steady
 from lineloom_core.timing import timed
 
@@ -41,6 +43,9 @@ class RecognitionConfig:
         16, "hypotheses", "that see the coarse check in free space", 1, 10_000
     )
     fine_keep: int = parameter(4, "hypotheses", "that see the full one", 1, 10_000)
+    constellations: int = parameter(
+        4, "hypotheses", "by objects and corners that see the full one", 1, 1000
+    )
     most_conflict: float = parameter(
         0.1, "share", "of points in the other's free space, beyond what is in its own"
     )
@@ -93,7 +98,7 @@ def recognise(
         return NOTHING_IN_COMMON
     registered = reference.register(current, Pose.from_array(table[0, :3]))
     checks = check_alignment(reference, current, registered)
-    checks["overlap"] = float(table[0, 9])
+    checks["overlap"], checks["objects"] = table[0, 9:11].tolist()
     evidence = evidence_for(checks["matched"], checks["conflict"], table[0, 9])
     checks["evidence"] = evidence
     rival = evidence_elsewhere(table, registered.pose, config)
@@ -116,20 +121,47 @@ def recognise(
 def hypotheses(
     reference: Place, current: Place, config: RecognitionConfig | None = None
 ) -> NDArray[np.float64]:
-    """Refined hypotheses (n, 10), best first: x, y, theta and figures (`_kernels.match_places`)."""
+    """Refined hypotheses (n, 11), best first: x, y, theta and figures (`_kernels.match_places`).
+
+    The last is the number of objects that both saw, where it was by these and corners.
+    """
     config = config or RecognitionConfig()
+    table = _by_lines(reference, current, config)
+    if len(table) and evidence_of(table[0]) >= config.least_overlap:
+        return table
+    table = np.concatenate([_by_landmarks(reference, current, config), table])
+    ranked = sorted(table, key=evidence_of, reverse=True)
+    return np.array(ranked).reshape(-1, 11)
+
+
+def _by_lines(reference: Place, current: Place, config: RecognitionConfig) -> NDArray[np.float64]:
     if len(reference.lines) < 2 or len(current.lines) < 2:
-        return np.empty((0, 10))
-    table: NDArray[np.float64] = _kernels.match_places(
-        reference.lines, reference.ends, reference.edges, reference.surface.points,
-        reference.ranges, reference.angle_mins, reference.angle_increments, reference.sweep_poses,
-        current.lines, current.ends, current.edges, current.surface.points,
-        current.ranges, current.angle_mins, current.angle_increments, current.sweep_poses,
+        return np.empty((0, 11))
+    table = _kernels.match_places(
+        *_arrays(reference), *_arrays(current),
         config.rotations, config.cells, 0.25, config.pair_limit, config.cell, config.half, 0.3,
         config.least_explained, config.coarse_keep, config.fine_keep, 4,
         TOLERANCE, TOLERANCE_SLOPE,
     )  # fmt: skip
+    return np.column_stack([table, np.zeros(len(table))])
+
+
+def _by_landmarks(
+    reference: Place, current: Place, config: RecognitionConfig
+) -> NDArray[np.float64]:
+    table: NDArray[np.float64] = _constellation_kernels.match_constellations(
+        *_arrays(reference), *_arrays(current), reference.landmarks, current.landmarks,
+        config.half, config.coarse_keep, config.constellations, 4, TOLERANCE, TOLERANCE_SLOPE,
+    )  # fmt: skip
     return table
+
+
+def _arrays(place: Place) -> tuple[NDArray[Any], ...]:
+    """A place as the kernels take it."""
+    return (
+        place.lines, place.ends, place.edges, place.surface.points,
+        place.ranges, place.angle_mins, place.angle_increments, place.sweep_poses,
+    )  # fmt: skip
 
 
 def check_alignment(reference: Place, current: Place, registered: Registration) -> dict[str, float]:

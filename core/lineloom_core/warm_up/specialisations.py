@@ -95,6 +95,14 @@ MAPPING = _parsed(f"""
     matching._covariance_kernels.fill_covariance | S S F1 f f f f b F2
     matching._kernels.match_sweeps               | S S Q
     places._kernels.match_places                 | {_PLACE} {_PLACE} i i f i f f f f i i i f f
+    places._constellation_kernels.match_constellations | {_PLACE} {_PLACE} F2 F2 f i i i f f
+    places._constellation_kernels.propose_constellations | F2 F2 f i
+    places._constellation_kernels.vote_constellations | F2 F2 f J3
+    places._constellation_kernels.find_objects   | F2 f f
+    places._constellation_kernels.spans_of       | F2
+    places._constellation_kernels.count_common   | F2 F2 F1 f I2
+    places._constellation_kernels.lay_on         | F2 F2 I2 i F1
+    places._constellation_kernels.are_alike      | F1 F1 f f
     matching._spot_kernels.settle_spots          | J2 F2 f f F2 F2 F1 F2 f i f S L i f f
     matching._wide_search_kernels.search_widely  | U2 f f U2 f f F2 F1 f i
     matching._registration_kernels.register      | J2 F2 f f F2 F2 F1 F1 F1 f f i

@@ -16,6 +16,7 @@ from lineloom_lab.simulation.drive import Drive, Leg
 from lineloom_lab.simulation.faults import Blockers, Followers, ScanLoss, Walkers, glazed
 from lineloom_lab.simulation.fleet import Fleet
 from lineloom_lab.simulation.free_space import FreeSpace
+from lineloom_lab.simulation.halls import columned_hall
 from lineloom_lab.simulation.lidar import Lidar, scanner_360, sick_lms200
 from lineloom_lab.simulation.odometry import DriftingOdometry
 from lineloom_lab.simulation.office import office_floor
@@ -41,6 +42,7 @@ __all__ = [
     "Walkers",
     "World",
     "column_corridor",
+    "columned_hall",
     "corridors",
     "glazed",
     "long_corridor",

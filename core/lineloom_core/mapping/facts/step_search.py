@@ -53,11 +53,14 @@ _Match = tuple[MatchResult, Pose]
 class Searched:
     """best: the spot that is believed if any. lead: over the best rival that is no slide of it.
 
-    freedom: the motion in the track's frame that nothing speaks against, None if there is none.
-    backing: what the matcher says of it, "match", "weak" or "".
+    cost: what speaks against it, how unlike the last steps it is among that. A spot where all that
+    a scan shows is new would come to about 12: often that is what a weak find is, above all one
+    half a turn off in a corridor. freedom: the motion in the track's frame that nothing speaks
+    against, None if there is none. backing: what the matcher says of it, "match", "weak" or "".
     """
 
     best: Spot
+    cost: float
     lead: float
     freedom: Freedom | None
     backing: str
@@ -82,7 +85,8 @@ def search_step(
             spots += spotter.settle(_of_matches(more))
     found = judge(spots, matches=matches)
     best, freedom = found[0][1], find_freedom(spotter, found[0][1])
-    return Searched(best, _lead(found, freedom), freedom, _backing(best.pose, matches))
+    cost = best.misfit + _SURPRISE * expected.surprise(best.pose)
+    return Searched(best, cost, _lead(found, freedom), freedom, _backing(best.pose, matches))
 
 
 def spotter_of(recent: Recent, features: ScanFeatures, cloud: Cloud) -> Spotter:

@@ -266,9 +266,11 @@ class Tracker:
         figures = {
             "matched": searched.best.matched,
             "misfit": searched.best.misfit,
+            "cost": searched.cost,
             "lead": searched.lead,
             "backed": float(searched.backing == "match"),
             "wall": searched.best.matched * features.wall,
+            "turn": abs(self._pose.between(searched.best.pose).theta),
         }
         if expected.paced:  # who drives evenly and then is elsewhere was carried
             figures["surprise"] = expected.surprise(searched.best.pose)
