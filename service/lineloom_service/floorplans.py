@@ -17,7 +17,8 @@ from lineloom_core.fusion.occupancy import Rays, rasterise
 from lineloom_core.mapping.answers.site_view import MapLine, SiteView
 from numpy.typing import NDArray
 
-from lineloom_service.store.files import FileRecord, delete_file, list_files, put_file, read_file
+from lineloom_service.store.actions import remove_file
+from lineloom_service.store.files import FileRecord, list_files, put_file, read_file
 from lineloom_service.store.protocol import Store
 from lineloom_service.store.records import SiteRecord
 
@@ -81,7 +82,7 @@ class FloorPlans:
     async def remove(self, site: SiteRecord) -> bool:
         """Forget the plan; False where there is none."""
         self._plans.pop(site.id, None)
-        return await self._store.write(delete_file, site.id, "floorplan", _NAME)
+        return await self._store.write(remove_file, site.id, "floorplan", _NAME)
 
     async def placements(
         self,

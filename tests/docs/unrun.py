@@ -32,6 +32,7 @@ UNRUN = (
 
 UNRUN_SPANS = (
     Unrun(r".*(…|[A-Z]{2,}|\bA B\b)", None, "a placeholder, not a command"),
+    Unrun(r"lineloom db", None, "runs in the blocks, and in tests/service/test_keeping.py"),
     Unrun(r"lineloom serve", None, "runs in the blocks"),
     Unrun(r"lineloom demo", None, "tests/clients/cli/test_demo.py runs it"),
     Unrun(r"lineloom bench", None, "minutes; tests/lab/evaluation runs parts"),

@@ -13,7 +13,7 @@ from lineloom_service.store.sqlite_engine import sqlite_engine
 Rows = dict[str, list[dict[str, Any]]]
 """Table -> its rows."""
 
-REVISIONS = ("0001", "0002", "0003", "0004", "0005", "0006", "0007", "0008", "0009")
+REVISIONS = ("0001", "0002", "0003", "0004", "0005", "0006", "0007", "0008", "0009", "0010")
 
 SCANS = [NewScan("0", seq, b"scan %d" % seq) for seq in (0, 1, 2, 4)]
 
@@ -70,6 +70,9 @@ _ADDED: dict[str, Rows] = {
         "chapters": [{"site_id": 1, "producer": "v1", "number": 0, "crc": 1, "data": b"c"}],
     },
     "0009": {},
+    "0010": {
+        "tombstones": [{"id": 1, "kind": "site", "site_id": 7, "name": "gone", "at": 1.5}],
+    },
 }
 
 

@@ -111,7 +111,7 @@ async def test_a_read_only_directory_is_refused_with_its_name(tmp_path: Path) ->
     assert f"StoreError: cannot use {data}: Permission denied" in done.stderr
 
 
-async def test_a_broken_page_stops_its_site_with_a_clear_word_and_no_other(
+async def test_a_broken_page_costs_its_entry_is_told_and_stops_nothing(
     tmp_path: Path,
 ) -> None:
     store = _store(tmp_path)
@@ -128,13 +128,16 @@ async def test_a_broken_page_stops_its_site_with_a_clear_word_and_no_other(
     await conductor.start()
     records = {record.name: record for record in await store.sites()}
     for _ in range(3000):
-        well = conductor.published(records["well"].id)
-        if well.position == 40 and conductor.trouble(records["broken"].id):
+        well, broken = (conductor.published(records[name].id) for name in ("well", "broken"))
+        if well.position == broken.position == 40:
             break
         await asyncio.sleep(0.02)
-    assert well.position == 40
+    assert (well.position, well.skipped) == (40, 0)
+    assert (broken.position, broken.skipped, broken.scans) == (40, 1, 39)
     assert conductor.trouble(records["well"].id) is None
-    assert "DatabaseError" in (conductor.trouble(records["broken"].id) or "")
+    trouble = conductor.trouble(records["broken"].id) or ""
+    assert "of its log" in trouble
+    assert "is damaged and left out" in trouble
     assert not any("broken" in reason for reason in conductor.not_ready())
     assert await _post(store, range(40, 50), site="well") == 10
     await conductor.stop()

@@ -275,7 +275,8 @@ async def test_skips_name_their_scan_and_the_first_reason_stands(store: SqlStore
     await _post(store, [0, 1])
     site = (await _record(store)).id
     await store.write_as_engine(record_skip, site, 2, "first")
-    skip = await store.write_as_engine(record_skip, site, 2, "second")
+    await store.write_as_engine(record_skip, site, 2, "second")
+    (skip,) = await store.read(read_skips, site, 2)
     assert (skip.robot, skip.session, skip.seq, skip.reason) == ("r", "0", 1, "first")
     assert await store.read(read_skips, site) == [skip]
 

@@ -28,7 +28,7 @@ from tests.service.databases import POSTGRESQL, fresh_database
 from tests.service.old_databases import REVISIONS, Rows, make_old, make_old_file, read_all
 
 OLDER = REVISIONS[:-1]
-HALVED = OLDER[:-1]
+HALVED = REVISIONS[: REVISIONS.index("0008")]
 """Those that earlier versions upgraded further, and could leave halfway."""
 
 Contents = dict[str, tuple[list[str], list[tuple[object, ...]]]]

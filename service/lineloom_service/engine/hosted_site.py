@@ -107,6 +107,7 @@ class HostedSite:
         """Why the site is not mapped, shown or saved just now; None where all is well."""
         found = [
             *self._own_troubles(),
+            *(runner.damage for runner in self._runners),
             *(self._means.engine.trouble(r.host) for r in self._runners),
         ]
         return "; ".join(dict.fromkeys(text for text in found if text)) or None

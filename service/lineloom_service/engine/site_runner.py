@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from lineloom_core.mapping.answers.site_view import SiteView
 
+from lineloom_service.engine.damaged_entries import describe_damage, read_the_whole_ones
 from lineloom_service.engine.making import Making, host_of
 from lineloom_service.engine.protocol import (
     Engine,
@@ -28,6 +29,7 @@ from lineloom_service.store.reads import read_feed, read_skips
 from lineloom_service.store.records import (
     SCANS,
     ChapterLostError,
+    DamagedError,
     LogEntry,
     SiteRecord,
     Skip,
@@ -122,6 +124,11 @@ class SiteRunner:
     def trouble(self) -> str | None:
         """Why the site is not mapped, shown or saved just now; None where all is well."""
         return "; ".join(self._troubles.values()) or None
+
+    @property
+    def damage(self) -> str | None:
+        """Which entries of the log cannot be read any more and are left out; None: none."""
+        return describe_damage(self.skips.values())
 
     @property
     def done(self) -> int:
@@ -251,7 +258,7 @@ class SiteRunner:
         """Start from the latest snapshot, or from nothing."""
         self._died = False
         self._order = await self._store.read(read_order, self.site, self.making.order)
-        snapshot = await self._store.read(read_snapshot, self.site, self.making.id)
+        snapshot = await self._newest_snapshot()
         self._chapters = 0 if snapshot is None else snapshot.end
         if snapshot is None and self._former is not None:
             snapshot = await self._snapshot_of(self._former)
@@ -278,11 +285,19 @@ class SiteRunner:
         alike = self._order.alike(order)
         return await self._store.read(read_snapshot, self.site, former.id, alike)
 
+    async def _newest_snapshot(self) -> SnapshotRecord | None:
+        try:
+            found = await self._store.read(read_snapshot, self.site, self.making.id)
+        except DamagedError as error:
+            self._troubles["saving"] = f"its snapshot cannot be read: {error}"
+            return None
+        return found
+
     async def _send(self) -> None:
         # The next events go on from the view right there, so that view has to be published.
         short_of = self._recorded - self._sent
         limit = min(self._pace.chunk, short_of) if short_of > 0 else self._pace.chunk
-        entries = await self._store.read(read_feed, self.site, self._sent, limit, self._order)
+        entries = await self._read(limit)
         if not entries:  # the site was deleted: its runner is about to be stopped
             self._end = self._sent
             return
@@ -300,6 +315,16 @@ class SiteRunner:
             settled=self._sent == self._recorded and self._recorded_settled,
         )
         self._under_way.append((asyncio.ensure_future(answer), self._sent, self._scans_sent))
+
+    async def _read(self, limit: int) -> list[LogEntry]:
+        """Read on. What is damaged is left out for good: the rest of the log is not."""
+        try:
+            return await self._store.read(read_feed, self.site, self._sent, limit, self._order)
+        except DamagedError:
+            count = min(limit, self._end - self._sent)
+            return await read_the_whole_ones(
+                self._store, self.site, self._order, self._sent, count, self.skips
+            )
 
     def _is_for_it(self, entry: LogEntry) -> bool:
         # What orders another making is not for this one: so the other's version is the greater.

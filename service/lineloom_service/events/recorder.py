@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
+import zlib
 from dataclasses import dataclass, replace
 
 from lineloom import wire
@@ -23,8 +24,8 @@ from lineloom_service.events.remade import as_file, remade_event
 from lineloom_service.store.actions import append_events
 from lineloom_service.store.files import put_file
 from lineloom_service.store.protocol import Store
-from lineloom_service.store.reads import read_last_events
-from lineloom_service.store.records import EventBatch, StoreError
+from lineloom_service.store.reads import read_last_events, read_last_number
+from lineloom_service.store.records import DamagedError, EventBatch, StoreError
 
 _LOG = logging.getLogger(__name__)
 _RETRY_S = 1.0
@@ -72,7 +73,7 @@ class EventRecorder:
     async def told_of(self, site_id: int) -> str | None:
         """Return what the map was made with that was told of last, None where nothing was told."""
         history = await self._history(site_id)
-        return history.producer if history.number else None
+        return history.producer or None
 
     async def recorded_position(self, site_id: int) -> int:
         """Return the log position that a site's events go up to. Asked before it is mapped."""
@@ -85,20 +86,21 @@ class EventRecorder:
     async def _history(self, site_id: int) -> _History:
         history = self._histories.get(site_id)
         if history is None:
-            last = await self._store.read(read_last_events, site_id)
-            history = (
-                _History(0, 0, 0, "")
-                if last is None
-                else _History(
-                    last.number,
-                    last.position,
-                    last.version,
-                    last.producer,
-                    tells_settled(last.body),
-                )
-            )
-            self._histories[site_id] = history
+            history = self._histories[site_id] = await self._stored(site_id)
         return history
+
+    async def _stored(self, site_id: int) -> _History:
+        """Return the history as far as it is on disk; what is damaged ends it."""
+        try:
+            last = await self._store.read(read_last_events, site_id)
+            if last is None:
+                return _History(0, 0, 0, "")
+            settled = tells_settled(last.body)
+        except (DamagedError, ValueError, zlib.error):
+            _LOG.exception("site %d: its last events cannot be read", site_id)
+            number = await self._store.read(read_last_number, site_id)
+            return _History(number, 0, 0, "")
+        return _History(last.number, last.position, last.version, last.producer, settled)
 
     def on_view(self, site_id: int, position: int, view: SiteView, making: str) -> None:
         """Take a published view. Where views come faster than they are told, some are skipped."""

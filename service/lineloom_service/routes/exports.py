@@ -30,7 +30,8 @@ from lineloom_service.map_frames import in_frame
 from lineloom_service.openapi import also_as, body_of
 from lineloom_service.request_body import read_body
 from lineloom_service.service import Service
-from lineloom_service.store.files import FileRecord, delete_file, list_files, put_file, read_file
+from lineloom_service.store.actions import remove_file
+from lineloom_service.store.files import FileRecord, list_files, put_file, read_file
 from lineloom_service.store.records import SiteRecord
 
 router = APIRouter(tags=["exports"])
@@ -107,7 +108,7 @@ async def get_export(
 @router.delete("/v1/sites/{site}/exports/{export}", status_code=204)
 async def delete_export(site: KnownSite, export: str, service: ServiceDep) -> Response:
     """Remove an export that nobody uses any more."""
-    if not await service.store.write(delete_file, site.id, "export", export):
+    if not await service.store.write(remove_file, site.id, "export", export):
         raise _unknown(site, export)
     return Response(status_code=204)
 

@@ -13,10 +13,10 @@ from sqlalchemy import Connection, delete, func, insert, select, update
 from lineloom_service.store import tables
 from lineloom_service.store.config_entry import ConfigEntry
 from lineloom_service.store.database import notify
+from lineloom_service.store.files import FileKind, delete_file
 from lineloom_service.store.identity import sort_out
 from lineloom_service.store.ledger import SiteLedger
 from lineloom_service.store.questions import drop_questions
-from lineloom_service.store.reads import read_skips
 from lineloom_service.store.records import (
     ActionKind,
     Appended,
@@ -24,10 +24,10 @@ from lineloom_service.store.records import (
     Conflict,
     EventBatch,
     NewScan,
-    Skip,
     ViewRecord,
 )
 from lineloom_service.store.snapshots import purge_chapters
+from lineloom_service.store.tombstones import Tombstone, bury
 from lineloom_service.store.transaction import Transaction
 
 _FORGET_EVENTS_EVERY = 64
@@ -125,6 +125,7 @@ def forget_robot(tx: Transaction, site_name: str, robot_name: str) -> bool:
     for _, late in robot.order.pop_late():  # wherever they belong, they go with the robot
         tx.append_late(site, [entry for _, entry in late], in_order=False)
     tx.add_control(site, robot, "forget", None)
+    bury(tx, "robot", site.id, str(robot.id))
     tx.connection.execute(
         update(tables.robots).where(tables.robots.c.id == robot.id).values(forgotten=True)
     )
@@ -175,7 +176,31 @@ def delete_site(tx: Transaction, site_name: str) -> int | None:
     if site is None:
         return None
     tx.remove_site(site)
+    bury(tx, "site", site.id, site.name)
     return site.id
+
+
+def remove_file(tx: Transaction, site_id: int, kind: FileKind, name: str) -> bool:
+    """Delete a file for good; False where there is none of that name."""
+    gone = delete_file(tx, site_id, kind, name)
+    if gone:
+        bury(tx, kind, site_id, name)
+    return gone
+
+
+def delete_again(tx: Transaction, stone: Tombstone) -> None:
+    """Delete what a tombstone is of, if a former copy has brought it back."""
+    site = next((s for s in tx.ledger.sites.values() if s.id == stone.site_id), None)
+    if site is None:
+        return
+    if stone.kind == "robot":
+        again = [name for name, robot in site.robots.items() if str(robot.id) == stone.name]
+        for name in again:
+            forget_robot(tx, site.name, name)
+    elif stone.kind != "site":
+        delete_file(tx, site.id, stone.kind, stone.name)
+    elif site.name == stone.name:
+        tx.remove_site(site)
 
 
 def purge_portion(tx: Transaction) -> bool:
@@ -205,8 +230,11 @@ def release_due(tx: Transaction) -> None:
         tx.release_scans(site, robot)
 
 
-def record_skip(tx: Transaction, site_id: int, position: int, reason: str) -> Skip:
-    """Note that an entry is not fed again. The first reason stands."""
+def record_skip(tx: Transaction, site_id: int, position: int, reason: str) -> None:
+    """Note that an entry is not fed again. The first reason stands.
+
+    The entry itself is not looked at: SQLite commits nothing that has met a damaged page.
+    """
     tx.flush()
     c = tables.skips.c
     there = select(func.count()).where(c.site_id == site_id, c.position == position)
@@ -214,7 +242,6 @@ def record_skip(tx: Transaction, site_id: int, position: int, reason: str) -> Sk
         tx.connection.execute(
             insert(tables.skips).values(site_id=site_id, position=position, reason=reason)
         )
-    return read_skips(tx.connection, site_id, position)[0]
 
 
 def append_events(tx: Transaction, site_id: int, batch: EventBatch, kept: int) -> None:

@@ -191,3 +191,7 @@ class StoreError(Exception):
 
 class StorageFullError(StoreError):
     """There is no room for it."""
+
+
+class DamagedError(StoreError):
+    """What is stored is not what was written, or cannot be read any more. Others can."""

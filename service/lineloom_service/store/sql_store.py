@@ -13,13 +13,14 @@ from sqlalchemy import Connection
 from sqlalchemy.exc import SQLAlchemyError
 
 from lineloom_service.store.actions import begin_term, purge_portion
+from lineloom_service.store.damage import is_damage
 from lineloom_service.store.database import Claim, Database
 from lineloom_service.store.failure import failure_of
 from lineloom_service.store.group_commit import GroupCommit
 from lineloom_service.store.ledger import Ledger
 from lineloom_service.store.protocol import NEWS, CommitListener, NewsListener
 from lineloom_service.store.reads import read_revision, read_term
-from lineloom_service.store.records import SiteRecord, StoreError
+from lineloom_service.store.records import DamagedError, SiteRecord, StoreError
 from lineloom_service.store.storage_trial import told_plainly, try_storage
 from lineloom_service.store.transaction import Transaction
 
@@ -207,6 +208,8 @@ async def _guarded(result: Awaitable[T]) -> T:
     try:
         return await result
     except (SQLAlchemyError, OSError) as error:
+        if is_damage(error):
+            raise DamagedError("the storage is damaged: a page of it cannot be read") from error
         _LOG.exception("the database failed")
         raise failure_of(error) from error
 

@@ -99,6 +99,8 @@ entries = Table(
     Column("body", LargeBinary),
     # In the order of the feed; null while a scan waits for those before it.
     Column("position", BigInteger),
+    # `store.checksum`; null in entries from before there was one.
+    Column("crc", BigInteger),
     UniqueConstraint("stream_id", "seq", name="ux_entries_stream_seq"),
     UniqueConstraint("site_id", "position", name="ux_entries_site_position"),
     Index(
@@ -188,6 +190,19 @@ files = Table(
     Column("size", BigInteger, nullable=False),
     Column("created", Double, nullable=False),
     Column("data", LargeBinary, nullable=False),
+)
+
+# What was deleted on purpose, so that a former copy does not bring it back.
+tombstones = Table(
+    "tombstones",
+    metadata,
+    Column("id", _Id, primary_key=True),
+    # "site", "robot" or a kind of file.
+    Column("kind", String(16), nullable=False),
+    Column("site_id", BigInteger, nullable=False),
+    # Of the site or the file; of a robot its number.
+    Column("name", String(128), nullable=False),
+    Column("at", Double, nullable=False),
 )
 
 questions = Table(

@@ -9,6 +9,7 @@ from typing import Any
 from sqlalchemy import Connection, bindparam, func, insert, select, update
 
 from lineloom_service.store import tables
+from lineloom_service.store.checksum import checksum_of
 from lineloom_service.store.config_entry import OWN_ROBOT, ConfigEntry
 from lineloom_service.store.feed_order import ORDER_ROBOT, Place, encode_order
 from lineloom_service.store.ledger import Ledger, RobotLedger, SiteLedger
@@ -246,6 +247,7 @@ class Transaction:
             "position": None,
             **columns,
         }
+        self._new[entry]["crc"] = checksum_of(self._new[entry])
         site.changed.add(robot.name)
         self.touched[site.id] = site
         return entry

@@ -11,6 +11,7 @@ from typer.core import TyperGroup
 from lineloom.cli import (
     bench,
     config,
+    db,
     demo,
     doctor,
     experiment,
@@ -98,6 +99,7 @@ app.command("doctor")(doctor.doctor)
 app.command("experiment")(experiment.experiment)
 app.add_typer(bench.app, name="bench")
 app.add_typer(config.app, name="config")
+app.add_typer(db.app, name="db")
 app.add_typer(export.app, name="export")
 app.add_typer(floorplan.app, name="floorplan")
 app.add_typer(token.app, name="token")

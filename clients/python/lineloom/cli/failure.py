@@ -32,7 +32,7 @@ EXIT_CODES = """Exit codes:
   2  the command line is wrong
   3  the service cannot be reached
   4  done, but the answer is no: no match, robots not merged, map not idle in time, no place in
-     the floor plan, or the doctor found something wrong"""
+     the floor plan, the doctor found something wrong, or the database is damaged"""
 
 _NEXT = {
     "unknown-site": "`lineloom status` lists the sites.",
