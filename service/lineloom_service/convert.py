@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from lineloom_service.engine.hosted_site import Remaking
 from lineloom_service.engine.published import Published
+from lineloom_service.observation.arrivals import Heard
 from lineloom_service.relative_pose import RelativePose
 from lineloom_service.store.codec import decode_mount
 from lineloom_service.store.records import SCANS, RobotRecord, SiteRecord, Skip
@@ -92,6 +93,7 @@ def to_robot(
     record: RobotRecord,
     view: SiteView,
     skips: Iterable[Skip],
+    heard: Heard,
     conflict: str | None = None,
 ) -> wire.Robot:
     """Return a robot at its latest processed scan. conflict: why scans of it are refused."""
@@ -110,20 +112,33 @@ def to_robot(
             "them come, the map is made anew with them at their places"
         )
     health += [_describe_skip(skip) for skip in skipped]
+    state = "starting" if seen is None else seen.state
+    if heard.is_silent:
+        health.append(silence(heard.silent_for_s))
     return wire.Robot(
         robot=record.name,
         site=site,
         component=None if seen is None else seen.component,
         settled=view.settled,
         pose=None if seen is None else to_uncertain_pose(seen),
-        state="starting" if seen is None else seen.state,
+        state="silent" if heard.is_silent else state,
         scans=_counts(record.accepted, processed, skipped_scans),
         keyframes=0 if seen is None else seen.keyframes,
         latest_stamp=None if seen is None else seen.latest_stamp,
         latest_session=None if seen is None else seen.latest_session,
         latest_seq=None if seen is None else seen.latest_seq,
+        last_received=heard.received,
+        silent_for_s=round(heard.silent_for_s, 1),
         mount=None if record.mount is None else _mount(decode_mount(record.mount)),
         health=health,
+    )
+
+
+def silence(seconds: float) -> str:
+    """Return what an operator should know of a robot that has fallen silent."""
+    return (
+        f"silent: no scan has come for {seconds:.0f} s: look at the robot, its network and what "
+        "its client answers"
     )
 
 

@@ -19,6 +19,7 @@ from lineloom_service.events.recorder import EventRecorder
 from lineloom_service.floorplans import FloorPlans
 from lineloom_service.maps.map_store import MapStore
 from lineloom_service.matching import PairMatcher
+from lineloom_service.observation.arrivals import Arrivals
 from lineloom_service.observation.conflicts import Conflicts
 from lineloom_service.observation.latency import Latency
 from lineloom_service.observation.metrics import Metrics, SiteFigures
@@ -37,6 +38,7 @@ from lineloom_service.store.sql_store import SqlStore
 
 _LOG = logging.getLogger(__name__)
 _LOOK_S = 0.05
+_LISTEN_S = 5.0
 
 
 class Service:
@@ -59,8 +61,8 @@ class Service:
             patience_s=settings.entry_timeout_s,
         )
         self.events = EventHub()
-        recorder = EventRecorder(self.store, self.events, settings.event_history)
-        self.conductor = Conductor(self.store, self.engine, settings, recorder)
+        self._recorder = EventRecorder(self.store, self.events, settings.event_history)
+        self.conductor = Conductor(self.store, self.engine, settings, self._recorder)
         self.pacer = Pacer()
         self.bodies = BodyBudget(settings.max_bodies_bytes)
         self.maps = MapStore(settings.map_cache_bytes)
@@ -77,11 +79,13 @@ class Service:
         self.metrics = Metrics()
         self.conflicts = Conflicts()
         self._latency = Latency()
+        self.arrivals = Arrivals(settings.silent_after_s)
         self._sites_seen: list[SiteRecord] = []
         self.metrics.watch(
             self.site_figures, self.engine.durations, self._latency.histogram, self.readiness
         )
         self._warming: asyncio.Task[None] | None = None
+        self._listening: asyncio.Task[None] | None = None
         self._taking = False
 
     async def start(self) -> None:
@@ -95,19 +99,25 @@ class Service:
         except BaseException:
             await self.store.close()
             raise
+        for record in await self.store.sites():
+            self.arrivals.begin(record)
         self.store.subscribe(self._latency.on_commit)
+        self.store.subscribe(self.arrivals.on_commit)
         self.conductor.subscribe(self._latency.on_view)
         self.conductor.subscribe(self._on_view)
         await self.conductor.start()
         self._taking = True
         self._warming = asyncio.create_task(self._warm_up())
         self._warming.add_done_callback(_report_failure)
+        self._listening = asyncio.create_task(self._listen())
+        self._listening.add_done_callback(_report_failure)
 
     async def stop(self) -> None:
         """Save and close. What was answered 202 is safe in any case."""
         self._taking = False
-        if self._warming is not None:
-            self._warming.cancel()
+        for task in (self._warming, self._listening):
+            if task is not None:
+                task.cancel()
         self.matcher.close()
         await self.guard.stop()
         await self.conductor.stop()
@@ -121,6 +131,18 @@ class Service:
         while self.conductor.maps and self.engine.not_ready():
             await asyncio.sleep(_LOOK_S)
         await self.matcher.warm_up()
+
+    async def _listen(self) -> None:
+        """Tell of robots that fall silent, and of those that are heard again."""
+        while True:
+            await asyncio.sleep(min(_LISTEN_S, 0.25 * self.settings.silent_after_s))
+            with contextlib.suppress(StoreError):
+                for record in await self.store.sites():
+                    turned = self.arrivals.turned(record)
+                    if not turned or not self.conductor.maps:
+                        continue
+                    if await self._recorder.tell_silence(record.id, turned):
+                        self.arrivals.note_told(record.id, turned)
 
     def _on_view(self, site_id: int, _position: int, _view: SiteView) -> None:
         # Not this very view: one from before a restart is not shown.
@@ -146,6 +168,7 @@ class Service:
                 published.view,
                 0 if remaking is None else max(0, remaking.of - remaking.position),
                 self.trouble(record.id) is not None,
+                self.arrivals.silent(record),
             )
             for record in self._sites_seen
             for published in [self.conductor.published(record.id)]
@@ -182,4 +205,4 @@ class Service:
 
 def _report_failure(task: asyncio.Task[None]) -> None:
     if not task.cancelled() and task.exception() is not None:
-        _LOG.critical("the matcher does not start", exc_info=task.exception())
+        _LOG.critical("a task of the service ended", exc_info=task.exception())

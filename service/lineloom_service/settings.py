@@ -97,6 +97,9 @@ class Settings(BaseSettings):
     token_streams: int = Field(
         default=64, ge=1, description="Listeners to events of one token at a time."
     )
+    silent_after_s: float = Field(
+        default=60.0, gt=0.0, description="A robot that sends no scan for this long is `silent`."
+    )
     gap_window_s: float = Field(
         default=2.0, ge=0.0, description="How long a scan waits for those before it."
     )

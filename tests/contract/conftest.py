@@ -49,6 +49,7 @@ async def service(
     settings = Settings(
         data_dir=tmp_path_factory.mktemp("data"),
         database_url=database_url,
+        silent_after_s=3600.0,
         gap_window_s=1.0,  # a busy machine may take as long from one POST to the next
         backlog_limit=BACKLOG_LIMIT,
         publish_every_s=0.05,

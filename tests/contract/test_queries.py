@@ -67,6 +67,9 @@ async def test_robots(client: httpx.AsyncClient) -> None:
     answer = (await _get(client, "/robots")).json()
     assert [robot["robot"] for robot in answer["robots"]] == ["a", "alone", "b"]
     robot = (await _get(client, "/robots/b")).json()
+    for each in (robot, answer["robots"][2]):
+        assert 0.0 <= each.pop("silent_for_s") < 3600.0
+        assert each["last_received"] > 1e9
     assert robot == answer["robots"][2]
     assert robot["component"] == "c1"
     assert robot["state"] == "tracking"

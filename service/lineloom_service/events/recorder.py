@@ -11,6 +11,7 @@ import asyncio
 import logging
 import time
 import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from lineloom import wire
@@ -21,6 +22,7 @@ from lineloom_service.events.codec import encode, pack, tells_settled
 from lineloom_service.events.difference import events_between
 from lineloom_service.events.hub import EventHub
 from lineloom_service.events.remade import as_file, remade_event
+from lineloom_service.events.silence import silence_events
 from lineloom_service.store.actions import append_events
 from lineloom_service.store.files import put_file
 from lineloom_service.store.protocol import Store
@@ -131,6 +133,38 @@ class EventRecorder:
             made.position, made.view, made.making, time.time(), "the map was made anew", made.why
         )
         self._tell(site_id, history, publication)
+
+    async def tell_silence(self, site_id: int, turned: Mapping[str, float | None]) -> bool:
+        """Tell which robots are silent now, for how long [s], and which (None) are heard again.
+
+        It is told beside the last view, and leaves the history where it was. False where that
+        cannot be yet: while there is none, or another is being told.
+        """
+        await self.settled(site_id)
+        history = self._histories.get(site_id)
+        if history is None or history.told is None or not history.number:
+            return False
+        if history.task is not None and not history.task.done():
+            return False
+        history.task = asyncio.create_task(self._record_silence(site_id, history, turned))
+        return True
+
+    async def _record_silence(
+        self, site_id: int, history: _History, turned: Mapping[str, float | None]
+    ) -> None:
+        assert history.told is not None
+        told = encode(silence_events(history.told, turned, time.time(), settled=history.settled))
+        batch = EventBatch(
+            history.number + 1, history.position, history.version, history.producer, pack(told)
+        )
+        try:
+            await self._store.write_as_engine(append_events, site_id, batch, self._kept)
+        except StoreError:
+            _LOG.exception("events of silent robots are not kept")
+        else:
+            history.number = batch.number
+            self._hub.add(site_id, batch.number, told)
+        await self._record(site_id, history)  # what came meanwhile
 
     def _tell(self, site_id: int, history: _History, publication: _Publication) -> None:
         history.waiting = publication

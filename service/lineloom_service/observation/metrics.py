@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 from collections import Counter as Tally
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 from lineloom.wire import Readiness
 from lineloom_core.mapping.answers.site_view import SiteView
@@ -17,13 +17,15 @@ from prometheus_client.registry import Collector
 from lineloom_service import __version__
 from lineloom_service.observation.durations import Durations, Histogram
 
+_MOST_SILENT = 50
 _HTTP_BOUNDS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 
 
 @dataclass(frozen=True, slots=True)
 class SiteFigures:
     """A site now. pending: log entries not yet in the published map. remaking: not yet in the
-    one that is made to be shown instead. troubled: `trouble` says something."""
+    one that is made to be shown instead. troubled: `trouble` says something. silent: robots that
+    send nothing, and for how long [s]."""
 
     name: str
     pending: int
@@ -31,6 +33,7 @@ class SiteFigures:
     view: SiteView
     remaking: int = 0
     troubled: bool = False
+    silent: Mapping[str, float] = field(default_factory=dict)
 
 
 class Metrics:
@@ -177,9 +180,39 @@ def _site_gauges(sites: Sequence[SiteFigures]) -> Iterator[GaugeMetricFamily]:
         "lineloom_constraints", "Constraints by state.", labels=["site", "kind", "state"]
     )
     for site in sites:
-        for state, count in Tally(r.state for r in site.view.robots.values()).items():
+        states = Tally(
+            "silent" if name in site.silent else robot.state
+            for name, robot in site.view.robots.items()
+        )
+        for state, count in states.items():
             robots.add_metric([site.name, state], count)
         for kind, count in Tally((c.kind, c.state) for c in site.view.constraints).items():
             constraints.add_metric([site.name, *kind], count)
     yield robots
     yield constraints
+    yield from _robot_gauges(sites)
+
+
+def _robot_gauges(sites: Sequence[SiteFigures]) -> Iterator[GaugeMetricFamily]:
+    """What is the matter with robots; of the silent ones those that are so for longest."""
+    findings = GaugeMetricFamily(
+        "lineloom_findings",
+        "Robots by what their health names.",
+        labels=["site", "finding"],
+    )
+    silent = GaugeMetricFamily(
+        "lineloom_robot_silent_seconds",
+        "Since a silent robot's last scan, or since the start; the 50 longest of a site.",
+        labels=["site", "robot"],
+    )
+    for site in sites:
+        said = (text for robot in site.view.robots.values() for text in robot.health)
+        names = Tally(text.partition(": ")[0] for text in said)
+        names.update({"silent": len(site.silent)} if site.silent else {})
+        for name, count in names.items():
+            findings.add_metric([site.name, name], count)
+        longest = sorted(site.silent.items(), key=lambda row: -row[1])[:_MOST_SILENT]
+        for robot, seconds in longest:
+            silent.add_metric([site.name, robot], seconds)
+    yield findings
+    yield silent

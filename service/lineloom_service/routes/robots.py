@@ -78,4 +78,5 @@ async def delete_robot(site: KnownSite, robot: KnownRobot, service: ServiceDep) 
 
 def _robot(site: SiteRecord, robot: RobotRecord, view: SiteView, service: Service) -> wire.Robot:
     conflict = service.conflicts.finding(site.id, robot.name)
-    return to_robot(site.name, robot, view, service.conductor.skips(site.id), conflict)
+    heard = service.arrivals.heard(site.id, robot)
+    return to_robot(site.name, robot, view, service.conductor.skips(site.id), heard, conflict)

@@ -10,7 +10,7 @@ from lineloom.wire.base import Answer, Number, Request, Settled
 from lineloom.wire.pose import UncertainPose
 from lineloom.wire.site import ScanCounts
 
-RobotState = Literal["starting", "tracking", "lost"]
+RobotState = Literal["starting", "tracking", "lost", "silent"]
 
 
 class MountSettings(Request):
@@ -37,7 +37,10 @@ class Robot(Answer):
     """A robot at its latest processed scan.
 
     pose: of the base (of the laser where no mount is set) in the component's map frame; null
-    before the first scan is placed. health: what an operator should know, in plain words.
+    before the first scan is placed. health: what an operator should know, in plain words. state:
+    `silent` where nothing has come for long. last_received: when its last scan came, by the
+    server's clock [s since 1970], null where that was before the service started; silent_for_s:
+    since then, or since the start.
     """
 
     robot: str
@@ -51,6 +54,8 @@ class Robot(Answer):
     latest_stamp: float | None = None
     latest_session: str | None = None
     latest_seq: int | None = None
+    last_received: float | None = None
+    silent_for_s: float | None = None
     mount: MountSettings | None = None
     health: list[str]
 

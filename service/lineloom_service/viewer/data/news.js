@@ -13,6 +13,7 @@ export function newsBetween(before, after) {
     ...joined(before, after),
     ...parted(before, after),
     ...lost(before, after),
+    ...silent(before, after),
     ...ailing(before, after),
   ];
 }
@@ -46,4 +47,11 @@ function lost(before, after) {
   return after.robots
     .filter(({ robot, state }) => state === "lost" && before.robot(robot)?.state === "tracking")
     .map(({ robot }) => `${robot} has lost track`);
+}
+
+/** @param {import("./site_state.js").SiteState} before @param {import("./site_state.js").SiteState} after */
+function silent(before, after) {
+  return after.robots
+    .filter(({ robot, state }) => state === "silent" && (before.robot(robot)?.state ?? state) !== state)
+    .map(({ robot }) => `${robot} sends nothing`);
 }

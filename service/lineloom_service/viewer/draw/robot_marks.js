@@ -63,7 +63,7 @@ export class RobotMarks {
       }
       if (!layers.robots) continue;
       drawArrow(context, point, component.theta + pose.theta, colour, palette.ink.paper, robot.robot === selected);
-      const note = robot.state === "lost" ? " · lost" : robot.health.length > 0 ? " · !" : "";
+      const note = robot.state === "lost" || robot.state === "silent" ? ` · ${robot.state}` : robot.health.length > 0 ? " · !" : "";
       drawLabel(context, robot.robot + note, point.x + 13, point.y - 10, colour, palette.ink.paper, { bold: true });
     }
   }

@@ -12,7 +12,7 @@
  *   remaking?: RemakingAnswer|null}} SiteAnswer
  * @typedef {{position: number, of: number, why: string}} RemakingAnswer
  *
- * @typedef {{robot: string, component: string|null, state: "starting"|"tracking"|"lost",
+ * @typedef {{robot: string, component: string|null, state: "starting"|"tracking"|"lost"|"silent",
  *   pose: (Pose & {covariance: (number|null)[][]|null})|null, scans: ScanCounts,
  *   keyframes: number, latest_stamp: number|null, latest_session: string|null,
  *   latest_seq: number|null, health: string[]}} RobotAnswer
