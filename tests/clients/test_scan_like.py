@@ -68,10 +68,10 @@ def test_a_broken_scan_names_its_field(broken: dict[str, Any], field: str) -> No
     assert caught.value.field.startswith(field)
 
 
-def test_a_scan_without_seq_is_for_matching_only() -> None:
+def test_a_scan_without_stamp_is_for_matching_only() -> None:
     bare = {key: value for key, value in scan(1).items() if key not in ("seq", "stamp")}
     assert to_match_scan(bare).seq == 0
-    with pytest.raises(InvalidScanError, match="seq"):
+    with pytest.raises(InvalidScanError, match="stamp"):
         to_wire(bare)
 
 

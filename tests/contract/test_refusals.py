@@ -17,7 +17,6 @@ pytestmark = pytest.mark.asyncio(loop_scope="module")
 
 
 MALFORMED: list[tuple[str, dict[str, Any], str]] = [
-    ("no seq", {"seq": ...}, "/seq"),
     ("seq below 0", {"seq": -1}, "/seq"),
     ("seq with a fraction", {"seq": 1.5}, "/seq"),
     ("seq as text", {"seq": "1"}, "/seq"),
@@ -88,7 +87,7 @@ async def test_a_malformed_field_is_pointed_at(
         ("scan", ""),
         (None, ""),
         (7, ""),
-        ({}, "/seq"),
+        ({}, "/stamp"),
         ({"scans": []}, "/scans"),
         ({"scans": {}}, "/scans"),
         ({"scans": None}, "/scans"),

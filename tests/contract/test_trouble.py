@@ -33,11 +33,11 @@ async def test_why_a_site_is_not_mapped(
     make_scan: Callable[..., dict[str, Any]],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def broken(connection: sa.Connection, site_id: int, after: int, limit: int) -> list[LogEntry]:
+    def broken(connection: sa.Connection, site_id: int, *position: Any) -> list[LogEntry]:
         name = sa.select(tables.sites.c.name).where(tables.sites.c.id == site_id)
         if connection.execute(name).scalar() == "troubled":
             raise StoreError("the storage failed: DatabaseError")
-        return read_feed(connection, site_id, after, limit)
+        return read_feed(connection, site_id, *position)
 
     with monkeypatch.context() as broken_store:
         broken_store.setattr(site_runner, "read_feed", broken)

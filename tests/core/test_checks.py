@@ -27,7 +27,10 @@ from tests.core.mapping.drives import mapped
 from tests.docs.checks_page import PAGE, page, parameters_of
 
 CORE = Path(__file__).parents[2] / "core" / "lineloom_core"
-UNITS = {"", "share", "m", "rad", "s", "σ", "1/m²", "points", "places", "constraints", "intervals"}
+UNITS = {
+    "", "share", "m", "rad", "s", "σ", "1/m²", "intervals",
+    "points", "objects", "places", "constraints",
+}  # fmt: skip
 ROWS = [pytest.param(t, row, id=f"{t.section}.{row.name}") for t in TABLES for row in t.rows]
 
 

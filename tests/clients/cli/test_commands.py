@@ -121,7 +121,7 @@ def test_replay_lists_what_was_refused(log: Path, loopback: str, fake: FakeServi
     [
         ("a.clf", "FLASER 3 1 2\n", "a.clf:1: FLASER: expected 3 ranges"),
         ("a.clf", "nothing\n", "holds no scans"),
-        ("a.jsonl", "{}\n", "a.jsonl:1: seq: Field required"),
+        ("a.jsonl", "{}\n", "a.jsonl:1: stamp: Field required"),
         ("a.jsonl", "{\n", "a.jsonl:1: not JSON"),
         ("a.jsonl", '{"stamp": NaN}\n', "a.jsonl:1: not JSON: NaN is not JSON"),
         ("a.jsonl", "[]\n", "a.jsonl:1: a scan is a JSON object"),

@@ -31,6 +31,7 @@ def test_these_are_the_commands() -> None:
     assert NAMES == [
         "bench",
         "config",
+        "db",
         "demo",
         "doctor",
         "experiment",
