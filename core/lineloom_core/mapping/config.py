@@ -137,7 +137,7 @@ class JoinConfig:
     """Believing a set of candidate constraints, which joins two components."""
 
     most_false: float = parameter(
-        0.01, "share", "how probable it may be that the set is false: see `join_odds`"
+        0.02, "share", "how probable it may be that the set is false: see `join_odds`"
     )
     least_set: int = parameter(2, "constraints", "mutually consistent ones in the set", 1)
     least_evidence: float = parameter(20.0, "m", "of wall that the set rests on")
