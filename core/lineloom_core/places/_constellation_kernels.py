@@ -26,6 +26,10 @@ NEAREST, FARTHEST = 2.0, 25.0
 """m: how far apart two landmarks are that vote: nearer ones tell no direction."""
 SAME_DISTANCE, SAME_DIRECTION = 0.35, math.cos(0.2)
 """m, cosine: what two views of two landmarks may differ by: of a column each sees another side."""
+GATES = 1.2, 0.7, 0.5
+"""m: how near landmarks are paired, in turn; those within the last are in common."""
+TWIN = 0.5, 0.1
+"""m, rad: nearer hypotheses are one."""
 LEAST = 6
 """Votes of a cell, and landmarks in common, below which chance does as well."""
 
@@ -189,7 +193,7 @@ def propose_constellations(ref, cur, half, most):  # type: ignore[no-untyped-def
         pose[0], pose[1] = (x + 0.5) * CELL - half, (y + 0.5) * CELL - half
         pose[2] = (turn + 0.5) * 2.0 * math.pi / TURNS - math.pi
         count = 0
-        for gate in (1.2, 0.7, 0.5):
+        for gate in GATES:
             count, _ = count_common(ref, cur, pose, gate, pairs)
             if count < LEAST:
                 break
@@ -221,8 +225,8 @@ def match_constellations(  # type: ignore[no-untyped-def]
         overlap = refine(ref, ref_ends, ref_edges, cur, cur_ends, cur_edges, pose, H, iterations)
         twin = False
         for q in range(kept):
-            near = math.hypot(out[q, 0] - pose[0], out[q, 1] - pose[1]) < 0.5
-            twin = twin or (near and abs(wrap_angle(out[q, 2] - pose[2])) < 0.1)
+            near = math.hypot(out[q, 0] - pose[0], out[q, 1] - pose[1]) < TWIN[0]
+            twin = twin or (near and abs(wrap_angle(out[q, 2] - pose[2])) < TWIN[1])
         if twin:
             continue
         judge_places(
@@ -230,7 +234,7 @@ def match_constellations(  # type: ignore[no-untyped-def]
             cur_points, cur_ranges, cur_mins, cur_incs, cur_poses,
             pose, 2, base, slope, counts,
         )  # fmt: skip
-        _, objects = count_common(ref_landmarks, cur_landmarks, pose, 0.5, pairs)
+        _, objects = count_common(ref_landmarks, cur_landmarks, pose, GATES[-1], pairs)
         out[kept, :3], out[kept, 3], out[kept, 4] = pose, proposals[k, 4], proposals[k, 3]
         out[kept, 5:9], out[kept, 9], out[kept, 10] = 2.0 * counts, overlap, objects
         rank[kept] = place_evidence(out[kept, 5], out[kept, 6], overlap)
