@@ -13,6 +13,7 @@ from lineloom.cli import options
 from lineloom.cli.console import note as tell
 from lineloom.cli.console import print_json
 from lineloom.cli.failure import CommandError, Exit
+from lineloom.cli.server_settings import server_settings
 
 T = TypeVar("T")
 
@@ -114,18 +115,10 @@ def salvage(file: NewFile, data_dir: DataDir = None) -> None:
 
 def _open(data_dir: Path | None) -> tuple[ModuleType, Any]:
     """Return the module that does it, and the settings that say where."""
-    try:
-        from lineloom_service.settings import Settings
-        from lineloom_service.store import keeping
-    except ImportError as error:
-        raise CommandError(
-            f"the service is not installed here ({error.name} is missing): "
-            "`pip install lineloom-client[server]`"
-        ) from None
-    try:
-        return keeping, Settings() if data_dir is None else Settings(data_dir=data_dir)
-    except ValueError as error:
-        raise CommandError(f"settings: {error}") from None
+    settings = server_settings(data_dir)
+    from lineloom_service.store import keeping
+
+    return keeping, settings
 
 
 def _said(work: Callable[[], T]) -> T:

@@ -13,6 +13,7 @@ from lineloom.cli import options
 from lineloom.cli.console import note as tell
 from lineloom.cli.console import print_json
 from lineloom.cli.failure import CommandError
+from lineloom.cli.server_settings import server_settings
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -114,20 +115,10 @@ def revoke(
 
 def _open(data_dir: Path | None) -> tuple[Any, Callable[[Any], Any]]:
     """Return the module that knows the table, and what runs its functions on the database."""
-    try:
-        from lineloom_service.security import token_book
-        from lineloom_service.settings import Settings
-        from lineloom_service.store.maintenance import run_beside
-        from lineloom_service.store.records import StoreError
-    except ImportError as error:
-        raise CommandError(
-            f"the service is not installed here ({error.name} is missing): "
-            "`pip install lineloom-client[server]`"
-        ) from None
-    try:
-        settings = Settings() if data_dir is None else Settings(data_dir=data_dir)
-    except ValueError as error:
-        raise CommandError(f"settings: {error}") from None
+    settings = server_settings(data_dir)
+    from lineloom_service.security import token_book
+    from lineloom_service.store.maintenance import run_beside
+    from lineloom_service.store.records import StoreError
 
     def run(work: Callable[[Any], Any]) -> Any:
         try:
