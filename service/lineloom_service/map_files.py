@@ -63,8 +63,12 @@ async def render_map(
     form = (format, component, box, shown.key, layers)
     write = _json if format == "json" else import_module(f"{_WRITERS}.{format}").write_map
     try:
-        return await service.maps.drawn(
-            site, shown.view, form, lambda: write(shown.view, component, box, site.name)
+        return await service.maps.other(
+            site,
+            shown.view,
+            form,
+            lambda: write(shown.view, component, box, site.name),
+            is_large=True,
         )
     except PictureTooLargeError as error:
         raise ProblemError(INVALID_PARAMETER, f"format: {error}") from None
@@ -136,8 +140,12 @@ async def _nav2(
     # Free space may be some scans newer than the view: the keyframes tell one from the next.
     form = ("nav2", chosen, box, shown.key, cell, layers, rays.poses.tobytes())
     try:
-        return await service.maps.drawn(
-            site, shown.view, form, lambda: nav2.write_map(rasterise(rays, lines, cell, box))
+        return await service.maps.other(
+            site,
+            shown.view,
+            form,
+            lambda: nav2.write_map(rasterise(rays, lines, cell, box)),
+            is_large=True,
         )
     except GridTooLargeError as error:
         raise ProblemError(INVALID_PARAMETER, f"resolution: {error}") from None

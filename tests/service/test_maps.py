@@ -226,7 +226,8 @@ async def test_of_each_site_one_thing_is_drawn_at_a_time() -> None:
             under_way[site] -= 1
             return b"%d" % form
 
-        return await store.drawn(SiteRecord(site, "s", 0, 0, 0, {}), view, (form,), render)
+        record = SiteRecord(site, "s", 0, 0, 0, {})
+        return await store.other(record, view, (form,), render, is_large=True)
 
     drawn = await asyncio.gather(*(draw(site, form) for form in range(4) for site in (1, 2)))
     assert drawn == [b"%d" % form for form in range(4) for _ in (1, 2)]

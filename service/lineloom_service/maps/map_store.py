@@ -72,19 +72,14 @@ class MapStore:
         view: SiteView,
         form: tuple[object, ...],
         render: Callable[[], str | bytes],
+        *,
+        is_large: bool = False,
     ) -> bytes:
-        """Return what `render` makes of the view; `form` names all that tells it from others."""
-        return await self._cache.get((site.id, view.stage, *form), render)
+        """Return what `render` makes of the view; `form` names all that tells it from others.
 
-    async def drawn(
-        self,
-        site: SiteRecord,
-        view: SiteView,
-        form: tuple[object, ...],
-        render: Callable[[], str | bytes],
-    ) -> bytes:
-        """Return the same of what takes much room while it is made: of each site one at a time."""
-        turn = self._turns.setdefault(site.id, asyncio.Lock())
+        is_large: it takes much room while it is made: of each site one at a time.
+        """
+        turn = self._turns.setdefault(site.id, asyncio.Lock()) if is_large else None
         return await self._cache.get((site.id, view.stage, *form), render, turn)
 
     def forget_site(self, site_id: int) -> None:
