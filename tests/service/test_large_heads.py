@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from tests.service.fake_server import free_port, server
+from tests.service.to_the_end import to_the_end
 
 BEGIN = b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n"
 POST = b"POST /v1/sites/s/robots/r/scans HTTP/1.1\r\nHost: localhost\r\n"
@@ -24,16 +25,6 @@ def port(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
 def wire(port: int) -> Iterator[socket.socket]:
     with socket.create_connection(("127.0.0.1", port), timeout=30.0) as wire:
         yield wire
-
-
-def _to_the_end(wire: socket.socket) -> bytes:
-    received = b""
-    try:
-        while part := wire.recv(65_536):
-            received += part
-    except ConnectionResetError:  # it had not read all that was sent
-        pass
-    return received
 
 
 def _sent(wire: socket.socket, part: bytes, most: int) -> int:
@@ -59,7 +50,7 @@ def _sent(wire: socket.socket, part: bytes, most: int) -> int:
 )
 def test_a_head_that_is_too_large_is_refused(wire: socket.socket, head: bytes) -> None:
     wire.sendall(head)
-    answer = _to_the_end(wire)
+    answer = to_the_end(wire)
     assert answer.startswith(b"HTTP/1.1 431 ")
     assert b'"type":"/problems/head-too-large"' in answer
     assert b"content-type: application/problem+json" in answer.lower()

@@ -12,6 +12,7 @@ import httpx
 import pytest
 
 from tests.service.fake_server import free_port, server
+from tests.service.to_the_end import to_the_end
 
 SCAN = {
     **{"seq": 0, "stamp": 0.0, "angle_min": -0.2, "angle_increment": 0.1},
@@ -44,17 +45,6 @@ def _connect(port: int) -> socket.socket:
 
 def _head(site: bytes, length: int) -> bytes:
     return HEAD % site + JSON % length
-
-
-def _to_the_end(wire: socket.socket) -> bytes:
-    """Return all that comes until the service closes the connection."""
-    received = b""
-    try:
-        while part := wire.recv(65_536):
-            received += part
-    except ConnectionResetError:  # it had not read all that was sent
-        pass
-    return received
 
 
 def _answer(wire: socket.socket) -> bytes:
@@ -99,7 +89,7 @@ def test_a_body_that_stops(port: int) -> None:
     before = _refused(port, "slow-body")
     with _connect(port) as wire:
         wire.sendall(_head(b"stops", len(BODY)) + BODY[:-5])
-        _expect_408(_to_the_end(wire))
+        _expect_408(to_the_end(wire))
     assert _refused(port, "slow-body") == before + 1
     base = f"http://127.0.0.1:{port}/v1/sites/stops"
     assert httpx.get(base).status_code == 404  # nothing was taken
@@ -110,21 +100,21 @@ def test_a_body_that_stops(port: int) -> None:
 def test_a_body_that_trickles(wire: socket.socket) -> None:
     wire.sendall(_head(b"trickles", 1_000_000))
     _trickle(wire, b" ")
-    _expect_408(_to_the_end(wire))
+    _expect_408(to_the_end(wire))
 
 
 def test_a_chunked_body_that_trickles(wire: socket.socket) -> None:
     wire.sendall(HEAD % b"chunked" + b"Content-Type: application/json\r\n")
     wire.sendall(b"Transfer-Encoding: chunked\r\n\r\n")
     _trickle(wire, b"1\r\n \r\n")
-    _expect_408(_to_the_end(wire))
+    _expect_408(to_the_end(wire))
 
 
 def test_what_was_acknowledged_before_stays(port: int, wire: socket.socket) -> None:
     wire.sendall(_head(b"stays", len(BODY)) + BODY)
     assert _answer(wire).startswith(b"HTTP/1.1 202 ")
     wire.sendall(_head(b"stays", len(BODY)) + BODY[:10])
-    _expect_408(_to_the_end(wire))
+    _expect_408(to_the_end(wire))
     site = httpx.get(f"http://127.0.0.1:{port}/v1/sites/stays").json()
     assert site["scans"]["accepted"] == 1
 
@@ -142,20 +132,20 @@ def test_who_goes_away_is_no_failure_of_ours(port: int) -> None:
 
 
 def test_a_connection_without_a_request(wire: socket.socket) -> None:
-    assert _to_the_end(wire) == b""
+    assert to_the_end(wire) == b""
 
 
 def test_a_head_that_trickles(wire: socket.socket) -> None:
     wire.sendall(HEAD % b"head")
     _trickle(wire, b"X")
-    assert _to_the_end(wire) == b""
+    assert to_the_end(wire) == b""
 
 
 def test_a_second_head_that_trickles(wire: socket.socket) -> None:
     wire.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
     assert _answer(wire).startswith(b"HTTP/1.1 200 ")
     _trickle(wire, b"\r\n")
-    assert _to_the_end(wire) == b""
+    assert to_the_end(wire) == b""
 
 
 def test_a_body_that_nobody_reads(wire: socket.socket) -> None:
@@ -163,7 +153,7 @@ def test_a_body_that_nobody_reads(wire: socket.socket) -> None:
     wire.sendall(head)
     assert _answer(wire).startswith(b"HTTP/1.1 405 ")
     _trickle(wire, b" ")
-    assert _to_the_end(wire) == b""
+    assert to_the_end(wire) == b""
 
 
 def test_an_answer_may_take_longer(port: int) -> None:
