@@ -83,7 +83,7 @@ def test_a_log_line_is_json_and_says_what_it_is_about(capsys: pytest.CaptureFixt
         except ValueError:
             logger.exception("failed")
 
-    contextvars.copy_context().run(work)
+    contextvars.Context().run(work)
     first, second = (json.loads(line) for line in capsys.readouterr().err.splitlines())
     assert first.pop("time")
     assert first == {
@@ -105,6 +105,6 @@ def test_a_log_line_for_people(capsys: pytest.CaptureFixture[str]) -> None:
         log.bind(site="floor")
         logging.getLogger("lineloom_service.test").warning("took %d", 3)
 
-    contextvars.copy_context().run(work)
+    contextvars.Context().run(work)
     said = capsys.readouterr().err.strip()
     assert said.endswith("WARNING lineloom_service.test: took 3 (site floor)")

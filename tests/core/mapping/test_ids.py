@@ -65,6 +65,8 @@ def chosen(view: SiteView, origin: Origin, replay: SiteView | None = None) -> Co
     replay: it says the same there, or the test would show nothing.
     """
     found = [c for c in view.constraints if c.origin == origin and c.state == "accepted"]
+    if origin == "recognition":  # a loop that was found afterwards takes no map apart
+        found = [c for c in found if c.kind == "rendezvous"]
     middle = len(found) - 1 if origin == "recognition" else len(found) // 2
     order = sorted(range(len(found)), key=lambda i: abs(i - middle))
     return next(found[i] for i in order if replay is None or alike(replay, found[i].claim))
