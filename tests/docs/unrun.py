@@ -23,8 +23,9 @@ class Unrun:
 
 UNRUN = (
     Unrun(r"docker |export LINELOOM_DB_PASSWORD", 8, "no Docker engine where this is tested"),
-    Unrun(r"cd |ros2 |colcon ", 4, "no ROS where this is tested"),
-    Unrun(r"pip install ", 2, "would fetch the released package in place of this checkout's"),
+    Unrun(r"cd |ros2 |colcon ", 5, "no ROS where this is tested"),
+    Unrun(r"lineloom bridge", 1, "needs a robot; tests/clients/ros2 runs it"),
+    Unrun(r"pip install ", 3, "would fetch the released package in place of this checkout's"),
     Unrun(r"\S+python -m lineloom_lab.evaluation.calibration", 1, "fits for many minutes"),
     Unrun(r"curl -s \S+/config/difference", 1, "404 here; tests/contract/test_config.py has it"),
     Unrun(r"\S+lineloom bench pairs", 1, "minutes on real pairs; tests/lab/evaluation has it"),
@@ -34,6 +35,7 @@ UNRUN_SPANS = (
     Unrun(r".*(…|[A-Z]{2,}|\bA B\b)", None, "a placeholder, not a command"),
     Unrun(r"lineloom db", None, "runs in the blocks, and in tests/service/test_keeping.py"),
     Unrun(r"lineloom serve", None, "runs in the blocks"),
+    Unrun(r"lineloom bridge", None, "needs a robot; tests/clients/ros2 runs it"),
     Unrun(r"lineloom demo", None, "tests/clients/cli/test_demo.py runs it"),
     Unrun(r"lineloom bench", None, "minutes; tests/lab/evaluation runs parts"),
     Unrun(r"lineloom experiment", None, "minutes; tests/lab/experiments runs them"),

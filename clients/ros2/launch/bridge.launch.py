@@ -1,39 +1,70 @@
 """Starts the bridge of one robot: `ros2 launch lineloom_bridge bridge.launch.py robot:=r1`."""
 
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
-_ARGUMENTS = {
-    "url": ("", "Address of the service; LINELOOM_URL if left out."),
-    "site": ("default", "One floor of one building."),
-    "robot": ("robot", "This robot's name on the site."),
+_PARAMETERS = {
+    "url": "Address of the service.",
+    "site": "One floor of one building.",
+    "robot": "This robot's name on the site.",
+    "odometry": "Where odometry comes from: tf, topic or none.",
+    "map_frame": "The map's frame; {component} in it stands for the component's id.",
+    "odom_frame": "Odometry's frame.",
+    "base_frame": "The base's frame.",
+    "frame_prefix": "Before odom_frame and base_frame, e.g. r1/.",
+}
+"""Where left out, they are as params_file has them."""
+_REMAPPED = {
     "scan": ("scan", "Topic of the laser scans."),
     "odom": ("odom", "Topic of the odometry, with odometry:=topic."),
-    "odometry": ("tf", "Where odometry comes from: tf, topic or none."),
+    "/tf": ("tf", "Topic of transforms; tf:=/tf where robots of several namespaces share a tree."),
+    "/tf_static": ("tf_static", "Topic of static transforms, likewise."),
+}
+_OTHERS = {
+    "namespace": ("", "Namespace of the node and its topics, TF's included."),
+    "use_sim_time": ("false", "Time from /clock."),
+    "log_level": ("info", "debug, info, warn or error."),
 }
 
 
-def generate_launch_description() -> LaunchDescription:
-    """Return the node with its arguments."""
-    declared = [
-        DeclareLaunchArgument(name, default_value=default, description=about)
-        for name, (default, about) in _ARGUMENTS.items()
+def _node(context: LaunchContext) -> list[Node]:
+    """Return the node. What was given by name beats params_file."""
+    given = {name: LaunchConfiguration(name).perform(context) for name in _PARAMETERS}
+    # As text whatever it looks like: a robot may be called 7.
+    named = {name: ParameterValue(v, value_type=str) for name, v in given.items() if v}
+    clock = ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool)
+    return [
+        Node(
+            package="lineloom_bridge",
+            executable="bridge",
+            name="lineloom_bridge",
+            namespace=LaunchConfiguration("namespace"),
+            output="screen",
+            parameters=[LaunchConfiguration("params_file"), named, {"use_sim_time": clock}],
+            remappings=[(topic, LaunchConfiguration(topic.lstrip("/"))) for topic in _REMAPPED],
+            ros_arguments=["--log-level", LaunchConfiguration("log_level")],
+        )
     ]
-    given = {name: LaunchConfiguration(name) for name in ("url", "site", "robot", "odometry")}
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Return the arguments, and the node made of them."""
     share = FindPackageShare("lineloom_bridge")
-    defaults = PathJoinSubstitution([share, "config", "bridge.yaml"])
-    node = Node(
-        package="lineloom_bridge",
-        executable="bridge",
-        name="lineloom_bridge",
-        output="screen",
-        parameters=[defaults, given],
-        remappings=[
-            ("scan", LaunchConfiguration("scan")),
-            ("odom", LaunchConfiguration("odom")),
-        ],
+    usual = PathJoinSubstitution([share, "config", "bridge.yaml"])
+    defaults = {topic.lstrip("/"): about for topic, about in _REMAPPED.items()} | _OTHERS
+    declared = [
+        DeclareLaunchArgument(name, default_value="", description=about)
+        for name, about in _PARAMETERS.items()
+    ]
+    declared += [
+        DeclareLaunchArgument(name, default_value=default, description=about)
+        for name, (default, about) in defaults.items()
+    ]
+    declared.append(
+        DeclareLaunchArgument("params_file", default_value=usual, description="Parameters, YAML.")
     )
-    return LaunchDescription([*declared, node])
+    return LaunchDescription([*declared, OpaqueFunction(function=_node)])

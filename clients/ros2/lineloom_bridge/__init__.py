@@ -1,4 +1,1 @@
-"""A ROS 2 robot as a robot of a Lineloom site.
-
-`node` alone knows ROS; everything else works on plain values, and is tested without it.
-"""
+"""The ROS 2 node of a robot of a Lineloom site; what it does is in `lineloom.bridge`."""

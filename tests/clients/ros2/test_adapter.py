@@ -10,13 +10,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from lineloom.bridge.lines import line_list
+from lineloom.bridge.localisation import map_transform
+from lineloom.bridge.occupancy import GridError, read_grid
+from lineloom.bridge.odometry_track import OdometryTrack
+from lineloom.bridge.planar import Planar, TiltedLidarError, mount, planar
+from lineloom.bridge.robot_bridge import NoTransformError
+from lineloom.bridge.scan_feed import ScanFeed, SentScan
+from lineloom.bridge.settings import SettingError, read_settings
+from lineloom.bridge.transform_tree import TransformTree
+from lineloom.bridge.waiting_scans import Released, WaitingScans
 from lineloom.scan_like import to_wire
 from lineloom.wire import Line, MapAnswer, MapComponent, Robot
-from lineloom_bridge.lines import line_list
-from lineloom_bridge.localisation import map_transform
-from lineloom_bridge.occupancy import GridError, read_grid
-from lineloom_bridge.planar import Planar, TiltedLidarError, mount, planar
-from lineloom_bridge.scan_feed import ScanFeed
 from lineloom_core.fusion.occupancy import OccupancyGrid
 from lineloom_core.geometry import Pose
 from lineloom_core.io.nav2 import write_map
@@ -67,16 +72,15 @@ def test_a_message_becomes_the_contracts_scan() -> None:
     assert (wire.odometry.x, wire.odometry.theta) == (1.0, 0.5)
     values = np.asarray(wire.ranges, dtype=float)
     np.testing.assert_array_equal(values, [1.0, np.nan, np.inf])
-    assert feed.odometry_at(0) == Planar(1.0, 2.0, 0.5)
-    assert feed.odometry_at(1) is None
+    assert feed.sent(0) == SentScan(5_500_000_000, Planar(1.0, 2.0, 0.5))
+    assert feed.sent(1) is None
 
 
 def test_too_many_scans_are_thinned_and_a_clock_that_jumps_back_is_no_end() -> None:
-    box = Box()
-    feed = ScanFeed(box, max_rate=10.0)
-    sent = [feed.put(scan(100.0 + 0.025 * i), None) is not None for i in range(40)]
+    feed = ScanFeed(Box(), max_rate=10.0)
+    sent = [feed.admits(scan(100.0 + 0.025 * i)) for i in range(40)]
     assert 8 <= sum(sent) <= 11
-    assert feed.put(scan(3.0), None) is not None
+    assert feed.admits(scan(3.0))
 
 
 def test_poses_compose_as_the_cores_do() -> None:
@@ -126,11 +130,11 @@ def robot(**changes: Any) -> Robot:
 def test_map_to_odom_puts_the_base_where_the_map_has_it() -> None:
     feed = ScanFeed(Box(), 10.0)
     T_odom_base = Planar(3.0, 1.0, 0.2)
-    feed.put(scan(), T_odom_base)
-    found = map_transform(robot(), feed)
+    feed.put(scan(7.25), T_odom_base)
+    found = map_transform(robot(), feed, odometry=True)
     assert found is not None
     assert not found.to_base
-    assert found.component == "c0"
+    assert (found.component, found.seq, found.stamp) == ("c0", 0, 7_250_000_000)
     base = found.T @ T_odom_base
     assert (base.x, base.y, base.theta) == pytest.approx((10.0, 5.0, math.pi / 2))
 
@@ -138,20 +142,120 @@ def test_map_to_odom_puts_the_base_where_the_map_has_it() -> None:
 def test_without_odometry_the_base_itself_is_placed() -> None:
     feed = ScanFeed(Box(), 10.0)
     feed.put(scan(), None)
-    found = map_transform(robot(), feed)
+    found = map_transform(robot(), feed, odometry=False)
     assert found is not None
     assert found.to_base
     assert (found.T.x, found.T.y) == (10.0, 5.0)
 
 
+def test_with_odometry_configured_the_base_is_never_placed_in_the_map() -> None:
+    feed = ScanFeed(Box(), 10.0)
+    feed.put(scan(), None)
+    assert map_transform(robot(), feed, odometry=True) is None
+
+
 @pytest.mark.parametrize(
     "changes",
-    [{"pose": None}, {"state": "lost"}, {"latest_session": "yesterday"}, {"component": None}],
+    [
+        {"pose": None},
+        {"state": "lost"},
+        {"state": "silent"},
+        {"latest_session": "yesterday"},
+        {"latest_seq": 7},
+        {"component": None},
+    ],
 )
 def test_no_transform_is_better_than_a_wrong_one(changes: dict[str, Any]) -> None:
     feed = ScanFeed(Box(), 10.0)
     feed.put(scan(), Planar())
-    assert map_transform(robot(**changes), feed) is None
+    assert map_transform(robot(**changes), feed, odometry=True) is None
+
+
+def test_odometry_is_interpolated_and_never_extrapolated() -> None:
+    track = OdometryTrack()
+    assert track.at(5) is None
+    track.put(10**9, Planar(1.0, 0.0, 3.0))
+    track.put(2 * 10**9, Planar(2.0, 4.0, -3.0))
+    half = track.at(1_500_000_000)
+    assert half is not None
+    assert (half.x, half.y) == (1.5, 2.0)
+    assert abs(half.theta) == pytest.approx(math.pi)  # the short way round, not through 0
+    assert track.at(2 * 10**9) == Planar(2.0, 4.0, -3.0)
+    assert track.at(10**9 - 1) is None
+    assert track.at(2 * 10**9 + 1) is None
+    track.put(1_900_000_000, Planar(9.0, 9.0, 9.0))  # out of order
+    assert track.at(2 * 10**9) == Planar(2.0, 4.0, -3.0)
+    track.put(5 * 10**8, Planar(7.0, 7.0, 0.0))  # the bag begins anew
+    assert track.at(5 * 10**8) == Planar(7.0, 7.0, 0.0)
+    assert track.at(10**9) is None
+
+
+def test_scans_wait_in_order_and_for_so_long() -> None:
+    waiting = WaitingScans(timeout=0.5)
+    known: dict[str, Planar] = {}
+    for name, at in (("a", 0.0), ("b", 0.1), ("c", 0.3)):
+        waiting.put(name, at)
+    assert waiting.release(known.get, 0.4) == []
+    known["b"] = Planar(1.0)
+    assert waiting.release(known.get, 0.45) == []  # a is before it
+    assert waiting.release(known.get, 0.5) == [Released("a", None), Released("b", Planar(1.0))]
+    known["c"] = Planar(2.0)
+    assert waiting.release(known.get, 0.55) == [Released("c", Planar(2.0))]
+
+
+def test_a_way_through_the_tree_is_followed_at_one_time() -> None:
+    tree = TransformTree()
+
+    def put(parent: str, child: str, at: float, pose: Planar, *, static: bool = False) -> None:
+        x, y, z, w = pose.quaternion
+        message = SimpleNamespace(
+            header=SimpleNamespace(
+                frame_id=parent, stamp=SimpleNamespace(sec=int(at), nanosec=round(at % 1 * 1e9))
+            ),
+            child_frame_id=child,
+            transform=SimpleNamespace(
+                translation=SimpleNamespace(x=pose.x, y=pose.y, z=0.0),
+                rotation=SimpleNamespace(x=x, y=y, z=z, w=w),
+            ),
+        )
+        tree.put(message, static=static)
+
+    put("base_footprint", "base_link", 0.0, Planar(0.1), static=True)
+    put("base_link", "laser", 0.0, Planar(0.2, 0.0, math.pi / 2), static=True)
+    put("odom", "base_footprint", 1.0, Planar(1.0, 0.0, 0.0))
+    put("odom", "base_footprint", 2.0, Planar(2.0, 0.0, 0.0))
+    found = tree.lookup("odom", "laser", 1_500_000_000)
+    assert found.translation == pytest.approx((1.8, 0.0, 0.0))
+    back = tree.lookup("laser", "odom", 1_500_000_000) @ found
+    assert back.translation == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
+    for stamp in (999_999_999, 2_000_000_001):
+        with pytest.raises(NoTransformError, match="from laser to odom"):
+            tree.lookup("odom", "laser", stamp)
+    with pytest.raises(NoTransformError):
+        tree.lookup("odom", "camera", None)
+
+
+def test_a_robot_may_be_called_7_and_a_rate_be_10() -> None:
+    settings = read_settings({"robot": 7, "max_rate": 10, "frame_prefix": "r7/"})
+    assert (settings.robot, settings.max_rate, settings.base) == ("7", 10.0, "r7/base_link")
+    assert read_settings({"map_frame": "map_{component}"}).map_of("c-1") == "map_c-1"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("robot", True, "robot: must be text"),
+        ("robot", "", "robot: must not be empty"),
+        ("publish_tf", "yes", "publish_tf: must be true or false"),
+        ("pose_period", 0, "pose_period: must be more than 0"),
+        ("transform_timeout", -1.0, "transform_timeout: must not be negative"),
+        ("max_rate", "fast", "max_rate: must be a number"),
+        ("odometry", "wheels", "odometry: 'wheels' is none of"),
+    ],
+)
+def test_a_wrong_parameter_is_named(name: str, value: Any, said: str) -> None:
+    with pytest.raises(SettingError, match=said):
+        read_settings({name: value})
 
 
 def test_the_services_grid_is_the_messages() -> None:

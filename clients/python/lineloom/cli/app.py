@@ -10,6 +10,7 @@ from typer.core import TyperGroup
 
 from lineloom.cli import (
     bench,
+    bridge,
     config,
     db,
     demo,
@@ -94,6 +95,7 @@ app.command("map")(map_command.map_)
 app.command("trajectory")(trajectory.trajectory)
 app.command("graph")(graph.graph)
 app.command("match")(match.match)
+app.command("bridge")(bridge.bridge)
 app.command("status")(status.status)
 app.command("doctor")(doctor.doctor)
 app.command("experiment")(experiment.experiment)
