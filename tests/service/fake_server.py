@@ -1,10 +1,9 @@
-"""Runs `serve_fake.py`: a real server process, with the fake mapper, to be killed at will."""
+"""Runs `serve_fake.py`: a server process of its own, with the fake mapper, to be killed at will."""
 
 from __future__ import annotations
 
 import os
 import socket
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -13,7 +12,7 @@ from pathlib import Path
 
 import httpx
 
-SERVER = Path(__file__).parent / "serve_fake.py"
+from tests.service.zygote import Forked, forked_server
 
 
 def free_port() -> int:
@@ -25,7 +24,7 @@ def free_port() -> int:
 
 
 @contextmanager
-def server(directory: Path, port: int, **environment: str) -> Iterator[subprocess.Popen[bytes]]:
+def server(directory: Path, port: int, **environment: str) -> Iterator[Forked]:
     """Run a server that answers; it is killed in the end."""
     with server_process(directory, port, **environment) as process:
         _wait_up(port, process)
@@ -33,21 +32,21 @@ def server(directory: Path, port: int, **environment: str) -> Iterator[subproces
 
 
 @contextmanager
-def server_process(
-    directory: Path, port: int, **environment: str
-) -> Iterator[subprocess.Popen[bytes]]:
+def server_process(directory: Path, port: int, **environment: str) -> Iterator[Forked]:
     """Start a server, whatever comes of it; it is killed in the end."""
-    command = [sys.executable, str(SERVER), str(directory), str(port)]
-    path = os.pathsep.join([str(SERVER.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
-    values = {**os.environ, "PYTHONPATH": path, **environment}
-    with subprocess.Popen(command, env=values) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
+    # Its workers import `fake_mapper` by its plain name.
+    path = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    process = forked_server(
+        [str(directory), str(port)], {**os.environ, "PYTHONPATH": path, **environment}
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
 
 
-def _wait_up(port: int, process: subprocess.Popen[bytes]) -> None:
+def _wait_up(port: int, process: Forked) -> None:
     # One client for all: making one reads every certificate that the system trusts.
     with httpx.Client(trust_env=False, verify=False) as client:
         for _ in range(1200):

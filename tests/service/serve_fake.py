@@ -1,10 +1,9 @@
-"""A real server process with the fake mapper: `python serve_fake.py DIRECTORY PORT`."""
+"""What a server process with the fake mapper runs."""
 
 from __future__ import annotations
 
 import asyncio
 import os
-import sys
 import time
 from pathlib import Path
 
@@ -16,7 +15,8 @@ from lineloom_service.service import Service
 from lineloom_service.settings import Settings
 
 
-def _serve(directory: Path, port: int) -> None:
+def serve(directory: Path, port: int) -> None:
+    """Serve until told to stop, then end the process."""
     settings = Settings(
         data_dir=directory,
         database_url=os.environ.get("SERVER_DATABASE_URL"),
@@ -34,7 +34,3 @@ def _serve(directory: Path, port: int) -> None:
         server._CLOSE_S = 1
         service.store.close = lambda: asyncio.sleep(3600.0)  # type: ignore[method-assign]
     server.run_service(service)
-
-
-if __name__ == "__main__":
-    _serve(Path(sys.argv[1]), int(sys.argv[2]))

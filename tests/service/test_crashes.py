@@ -8,7 +8,6 @@ import json
 import os
 import random
 import signal
-import subprocess
 from collections.abc import Sequence
 from itertools import groupby, islice
 from pathlib import Path
@@ -28,6 +27,7 @@ from lineloom_service.store.sqlite_database import SqliteDatabase
 
 from tests.service.fake_server import free_port, server
 from tests.service.plain_robots import Scans, Stream, drive, plain_scan
+from tests.service.zygote import Forked
 
 FAKE = "fake_mapper:FakeMapper"
 STREAMS: tuple[Stream, ...] = (("alone", "r"), ("shared", "r1"), ("shared", "r2"))
@@ -37,7 +37,7 @@ _NOT_POSTED = ("robot", "truth", "odometry")
 
 async def _disturb(
     port: int,
-    process: subprocess.Popen[bytes],
+    process: Forked,
     rng: random.Random,
     acknowledged: dict[Stream, int],
     scan: Scans,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import signal
 import socket
-import subprocess
 import time
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from lineloom_service.settings import Settings
 
 from tests.service.fake_server import free_port, server, server_process
 from tests.service.plain_robots import Stream, drive, plain_scan
+from tests.service.zygote import Forked
 
 STREAMS: tuple[Stream, ...] = tuple(("s", f"r{number}") for number in range(4))
 
@@ -36,7 +36,7 @@ def _idle(port: int) -> dict[str, Any]:
 
 
 async def _send_and_kill(
-    port: int, process: subprocess.Popen[bytes], acknowledged: dict[Stream, int], more: int
+    port: int, process: Forked, acknowledged: dict[Stream, int], more: int
 ) -> None:
     """SIGKILL the server in the middle of things, after `more` acknowledged scans."""
     goal = sum(acknowledged.values()) + more

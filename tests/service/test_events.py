@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
+import sqlite3
 import threading
 import time
 from collections.abc import AsyncGenerator, Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +18,10 @@ from lineloom import Client
 from lineloom.errors import NotFoundError
 from lineloom.retry import RetryPolicy
 from lineloom.wire import AnyEvent, MapEvent, ResetEvent, RobotEvent, ScanEvent
-from lineloom_service.events.codec import Place, Told
+from lineloom_service.events.codec import Place, Told, pack, tells_settled
 from lineloom_service.events.feed import Message
 from lineloom_service.events.stream import EventStream
+from lineloom_service.store.actions import _FORGET_EVENTS_EVERY as FORGOTTEN_EVERY
 
 from tests.service.fake_server import free_port, server
 
@@ -120,6 +124,22 @@ def test_nothing_is_missed_nor_told_twice_across_kills(
     assert versions == sorted(versions)
 
 
+def _told(directory: Path) -> tuple[int, int, bool]:
+    """Return number, position and whether settled, of what was told last."""
+    with closing(sqlite3.connect(directory / "lineloom.db")) as connection:
+        last = "SELECT number, position, body FROM events ORDER BY number DESC LIMIT 1"
+        number, position, body = connection.execute(last).fetchone() or (0, 0, pack(()))
+    return number, position, tells_settled(body)
+
+
+def _until(done: Callable[[], bool]) -> None:
+    for _ in range(3000):
+        if done():
+            return
+        time.sleep(0.02)
+    raise AssertionError("never happened")
+
+
 def test_whoever_was_away_is_told_the_rest(tmp_path: Path, port: int, client: Client) -> None:
     with server(tmp_path, port):
         client.post_scans("s", "r", _scans(range(5)))
@@ -138,9 +158,14 @@ def test_whoever_was_away_is_told_the_rest(tmp_path: Path, port: int, client: Cl
 
 def test_a_history_that_is_gone_is_a_reset(tmp_path: Path, port: int, client: Client) -> None:
     with server(tmp_path, port, LINELOOM_EVENT_HISTORY="3"):
-        for seq in range(70):
+        # A map that is newer when it is to be told takes an older one's place: not each is told.
+        posted = itertools.count()
+        while _told(tmp_path)[0] < FORGOTTEN_EVERY + 1:
+            seq = next(posted)
             client.post_scans("s", "r", _scans(range(seq, seq + 1)))
             client.wait_until_idle("s")
+        end = next(posted)
+        _until(lambda: _told(tmp_path)[1:] == (end, True))
         for place in ("1-1", "1-0", "2-1", "1-9999", "nonsense"):
             (event,) = client.events("s", last_event_id=place, until_now=True)
             assert isinstance(event, ResetEvent), place

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import sqlite3
-import subprocess
 import time
 from collections.abc import Callable
 from contextlib import closing
@@ -15,6 +16,7 @@ import pytest
 from lineloom import Client
 
 from tests.service.fake_server import free_port, server
+from tests.service.zygote import Forked
 
 SNAPSHOT_EVERY = 100
 """As `serve_fake.py` has it."""
@@ -44,22 +46,22 @@ def _saved(directory: Path) -> int:
     return position or 0
 
 
-def _kill(process: subprocess.Popen[bytes]) -> None:
+def _kill(process: Forked) -> None:
     process.kill()
     process.wait()
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
+def _end(process: Forked) -> None:
     process.terminate()
     assert process.wait(60) == 0
 
 
-def _end_all(process: subprocess.Popen[bytes]) -> None:
+def _end_all(process: Forked) -> None:
     """As systemd does: SIGTERM to every process of the unit."""
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
     assert children
     for child in children:
-        subprocess.run(["kill", "-TERM", child], check=True)
+        os.kill(int(child), signal.SIGTERM)
     time.sleep(0.2)  # the worst order: the workers first
     _end(process)
 
@@ -74,7 +76,7 @@ def _end_all(process: subprocess.Popen[bytes]) -> None:
     ],
 )
 def test_ready_is_said_with_the_map_of_before(
-    tmp_path: Path, scans: int, stop: Callable[[subprocess.Popen[bytes]], None], saved: int
+    tmp_path: Path, scans: int, stop: Callable[[Forked], None], saved: int
 ) -> None:
     port = free_port()
     with Client(f"http://127.0.0.1:{port}") as client:
