@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from lineloom_lab.evaluation.pair_bench import BenchRow, Figures
+from lineloom_lab.evaluation.pair_bench_halves import halves_tables
 from lineloom_lab.evaluation.pair_bench_sets import BenchSet
 from lineloom_lab.evaluation.pairs import TIERS
 
@@ -15,22 +16,31 @@ Tiers and overlap bins: full pose right (< 0.3 m, < 5 degrees), in percent; afte
 counting answers that are right in all but the slide they declare. cw: says "match" and is wrong, in
 percent of all pairs, negatives included. r@1 %, r@0: recall at 1 % and at no false positives, by
 the matcher's own score. ms: median CPU time of a pair, scans prepared / with both extractions.
+Pairs of logs: near is consecutive, skip with one scan between, mid and far from another time.
 A start from a good guess (up to 0.4 m, 10 degrees off) is help that the others do not get."""
 
 
 def to_json(rows: Sequence[BenchRow], sets: Sequence[BenchSet]) -> dict[str, Any]:
     """Return all figures for scripts: shares 0..1, times in milliseconds."""
     return {
-        "sets": [{"name": s.name, "collection": s.collection, "pairs": len(s.pairs)} for s in sets],
+        "sets": [
+            {
+                "name": s.name,
+                "collection": s.collection,
+                "pairs": len(s.pairs),
+                "half": s.origin.half if s.origin else "",
+            }
+            for s in sets
+        ],
         "matchers": [asdict(row) for row in rows],
     }
 
 
 def to_markdown(rows: Sequence[BenchRow], sets: Sequence[BenchSet]) -> str:
     """Return one table per collection, and what the columns mean."""
-    parts = [
-        _table(collection, rows, sets) for collection in dict.fromkeys(s.collection for s in sets)
-    ]
+    by_tier = dict.fromkeys(s.collection for s in sets if s.origin is None)
+    parts = [_table(collection, rows, sets) for collection in by_tier]
+    parts += [text for row in rows if (text := halves_tables(row, sets))]
     absent = {row.name: row.missing for row in rows if row.missing}
     if absent:
         parts.append("\n".join(f"{name}: not installed ({why})" for name, why in absent.items()))

@@ -12,6 +12,7 @@ import numpy as np
 from lineloom_core.geometry import Pose
 from lineloom_core.scan import Scan
 
+from lineloom_lab.evaluation.log_bench_log import Half
 from lineloom_lab.evaluation.pairs import Pair, Tier, load_pairs
 from lineloom_lab.evaluation.simulated_pairs import SimulatedPair, simulated_pairs
 from lineloom_lab.simulation import Lidar, scanner_360, sick_lms200, world_named
@@ -40,12 +41,22 @@ class BenchPair:
 
 
 @dataclass(frozen=True, slots=True)
+class LogOrigin:
+    """The log that pairs were drawn from, the lidar it was recorded with or made into, its half."""
+
+    log: str
+    lidar: str
+    half: Half
+
+
+@dataclass(frozen=True, slots=True)
 class BenchSet:
     """Pairs of one source. collection: sets of one collection are reported together."""
 
     name: str
     collection: str
     pairs: tuple[BenchPair, ...]
+    origin: LogOrigin | None = None
 
 
 def real_set(path: Path | str, limit: int | None = None) -> BenchSet:
@@ -127,7 +138,7 @@ def _simulated_set(name: str, lidar: Lidar, per_group: int, seed: int) -> BenchS
 def _bench_pair(drawn: SimulatedPair, rng: np.random.Generator) -> BenchPair | None:
     """Sort a simulated pair by overlap; None for too little of it nearby or too much far away."""
     truth = drawn.T_reference_current
-    guess = _good_guess(truth, rng)
+    guess = good_guess(truth, rng)
     overlap = overlap_share(drawn.reference, drawn.current, truth)
     if drawn.negative:
         if overlap > MOST_NEGATIVE_OVERLAP:
@@ -141,7 +152,8 @@ def _bench_pair(drawn: SimulatedPair, rng: np.random.Generator) -> BenchPair | N
     return None
 
 
-def _good_guess(truth: Pose, rng: np.random.Generator) -> Pose:
+def good_guess(truth: Pose, rng: np.random.Generator) -> Pose:
+    """Return a pose up to 0.4 m and 10 degrees from the true one."""
     distance = GUESS_RADIUS_M * math.sqrt(float(rng.random()))
     bearing, turn = rng.uniform(-math.pi, math.pi), rng.uniform(-1.0, 1.0) * GUESS_ANGLE_RAD
     return Pose(

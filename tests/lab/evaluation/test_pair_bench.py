@@ -231,8 +231,8 @@ def run(*arguments: str) -> Any:
 
 
 def test_the_command_reports_as_json(tmp_path: Path) -> None:
-    quick = ["--matchers", "lineloom,complete-lines", "--simulated", "2", "--limit", "1", "--json"]
-    result = run(*quick)
+    quick = ["--simulated", "2", "--limit", "1", "--from-logs", "0", "--json"]
+    result = run("--matchers", "lineloom,complete-lines", *quick)
     assert result.exit_code == 0, result.output
     figures = json.loads(result.stdout)
     assert [m["name"] for m in figures["matchers"]] == ["lineloom", "complete-lines"]
@@ -241,7 +241,7 @@ def test_the_command_reports_as_json(tmp_path: Path) -> None:
 
 
 def test_the_command_reports_as_a_table() -> None:
-    result = run("--matchers", "complete-lines", "--simulated", "1")
+    result = run("--matchers", "complete-lines", "--simulated", "1", "--from-logs", "0")
     assert result.exit_code == 0, result.output
     assert "**simulated-180** (4 pairs)" in result.stdout
 
@@ -260,6 +260,7 @@ def test_the_command_says_what_is_wrong(tmp_path: Path) -> None:
 
 def test_the_command_draws_the_worst_answers(tmp_path: Path) -> None:
     folder = tmp_path / "new" / "worst"
-    result = run("--matchers", "point-to-line", "--simulated", "2", "--worst", str(folder))
+    few = ["--simulated", "2", "--from-logs", "0"]
+    result = run("--matchers", "point-to-line", *few, "--worst", str(folder))
     assert result.exit_code == 0, result.output
     assert (folder / "worst-point-to-line-from-identity-simulated-180.png").exists()

@@ -11,7 +11,7 @@ import typer
 from lineloom.cli import options
 from lineloom.cli.bench_ladders import ladders
 from lineloom.cli.bench_lines import lines
-from lineloom.cli.bench_logs import logs
+from lineloom.cli.bench_logs import SHARED_LOGS, logs
 from lineloom.cli.bench_merges import merges
 from lineloom.cli.console import note, out, print_json
 from lineloom.cli.failure import CommandError, Exit, needing_core
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from lineloom_lab.evaluation.pair_bench_sets import BenchSet
     from lineloom_lab.experiments.worst_answers import BadAnswer
 
-SHARED_PAIRS = Path(__file__).resolve().parents[5] / "shared" / "data" / "pairs"
+SHARED_PAIRS = SHARED_LOGS / "pairs"
 """Where the real pairs lie beside a checkout: `../shared/data/pairs` from the project's root."""
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
@@ -65,6 +65,22 @@ Simulated = Annotated[
         min=0, max=1000, metavar="N", help="Simulated pairs per lidar and overlap; 0 for none."
     ),
 ]
+FromLogs = Annotated[
+    int,
+    typer.Option(
+        "--from-logs",
+        min=0,
+        max=1000,
+        metavar="N",
+        help="Pairs drawn from each log beside the real pairs, of each tier; 0 for none.",
+    ),
+]
+Lidars = Annotated[
+    bool,
+    typer.Option(
+        "--lidars", help="Pairs of logs also with fewer beams, less reach, narrower, noisier …"
+    ),
+]
 Limit = Annotated[
     int | None,
     typer.Option(min=1, metavar="N", help="At most so many pairs of each tier and overlap."),
@@ -83,6 +99,8 @@ def pairs(
     matchers: Matchers = "all",
     data: PairsFolder = None,
     simulated: Simulated = 40,
+    from_logs: FromLogs = 60,
+    lidars: Lidars = False,
     limit: Limit = None,
     worst: Worst = None,
     json: options.Json = False,
@@ -90,13 +108,16 @@ def pairs(
     """Run matchers over scan pairs whose true pose is known: how often right, how sure, how fast.
 
     The default, the thesis's, the literature's, and peers from PyPI (`pip install --group peers`;
-    those that are not installed are named as such). Everything takes a quarter of an hour; the
-    same options give the same answers, only times differ.
+    those that are not installed are named as such). Of every log with poses to compare with, pairs
+    are drawn, and told for the two halves of the buildings side by side: parameters are chosen with
+    half A. Everything takes half an hour; the same options give the same answers, only times
+    differ.
 
     \b
     Example:
       lineloom bench pairs --limit 10
       lineloom bench pairs --matchers lineloom,baselines --simulated 0 --json
+      lineloom bench pairs --matchers lineloom --lidars
       lineloom bench pairs --matchers lineloom --worst out/worst
     """
     use_one_thread()
@@ -104,7 +125,11 @@ def pairs(
         from lineloom_lab.evaluation.pair_bench import run_pair_bench
         from lineloom_lab.evaluation.pair_bench_report import to_json, to_markdown
     contestants = _contestants(matchers)
-    sets = _sets(data, simulated, limit)
+    sets = _sets(data, simulated, limit) + _of_logs(
+        data, min(from_logs, limit or from_logs), lidars
+    )
+    if not sets:
+        raise CommandError("there are no pairs: name a folder with --data, or use --simulated")
     album = _Album(worst)
     rows = run_pair_bench(contestants, sets, note, album.add)
     album.save()
@@ -167,6 +192,20 @@ def _sets(data: Path | None, simulated: int, limit: int | None) -> tuple[BenchSe
         note(f"no real pairs: {error}")
     if simulated:
         sets += simulated_sets(min(simulated, limit or simulated))
-    if not sets:
-        raise CommandError("there are no pairs: name a folder with --data, or use --simulated")
     return sets
+
+
+def _of_logs(data: Path | None, per_tier: int, lidars: bool) -> tuple[BenchSet, ...]:
+    """Pairs of the logs in the folder above that of the pairs; none where there are no logs."""
+    from lineloom_lab.evaluation.pair_bench_lidars import DERIVED, RECORDED
+    from lineloom_lab.evaluation.pair_bench_logs import log_sets
+
+    if per_tier == 0:
+        return ()
+    chosen = (RECORDED, *DERIVED) if lidars else (RECORDED,)
+    folder = data.resolve().parent if data is not None else SHARED_LOGS
+    try:
+        return tuple(log_sets(folder, per_tier, chosen))
+    except (OSError, ValueError) as error:
+        note(f"no pairs of logs: {error}")
+        return ()
