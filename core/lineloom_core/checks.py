@@ -194,6 +194,11 @@ DOUBTED = Checks("What was believed, when more is known", "doubt", (
           objection="the graph contradicts it"),
 ))
 
+SAID = Checks("An operator's join", "recognition", (
+    Check("snapped_m", "Moved by the matcher", "m"),
+    Check("snapped_rad", "Turned by the matcher", "rad"),
+))
+
 LOCALISED = Checks("A spot where a scan may have been taken", "localise", (
     Check("matched", "Points in common", "points", at_least="least_matched",
           objection="too little of what was seen is known"),
@@ -212,4 +217,4 @@ LOCALISED = Checks("A spot where a scan may have been taken", "localise", (
 ))
 # fmt: on
 
-TABLES = (TRACKED, NEAR_LOOP, RECOGNISED, WIDE_LOOP, JOINED, DOUBTED, LOCALISED)
+TABLES = (TRACKED, NEAR_LOOP, RECOGNISED, WIDE_LOOP, JOINED, DOUBTED, SAID, LOCALISED)

@@ -7,7 +7,7 @@ from dataclasses import asdict
 
 from lineloom import wire
 from lineloom_core.check import Limit
-from lineloom_core.mapping.answers.evidence import Evidence, WhatIf
+from lineloom_core.mapping.answers.evidence import Evidence, JoinTrial, WhatIf
 from lineloom_core.mapping.answers.localisation import Localisation
 from lineloom_core.mapping.answers.site_view import ConstraintView
 
@@ -23,16 +23,7 @@ def to_detail(constraint: ConstraintView, evidence: Evidence | None) -> wire.Con
     return wire.ConstraintDetail(
         **basis,
         limits=_limits(evidence.limits),
-        matched=[
-            wire.MatchedLines(
-                reference=list(m.reference),
-                current=list(m.current),
-                overlap=m.overlap,
-                distance=m.distance,
-                angle=m.angle,
-            )
-            for m in evidence.matched
-        ],
+        matched=_matched(evidence),
         conflicts=evidence.conflicts.tolist(),
         votes=evidence.votes,
         runner_up=None
@@ -40,6 +31,40 @@ def to_detail(constraint: ConstraintView, evidence: Evidence | None) -> wire.Con
         else wire.RunnerUp(x=best.x, y=best.y, theta=best.theta, evidence=best.evidence),
         margin=evidence.margin,
     )
+
+
+def to_join_trial(found: JoinTrial) -> wire.JoinTrial:
+    """Return what an operator's join would be."""
+    T = found.T_frames
+    return wire.JoinTrial(
+        constraint=found.constraint,
+        component_a=found.component_a,
+        component_b=found.component_b,
+        keyframe_a=found.keyframe_a,
+        keyframe_b=found.keyframe_b,
+        T_a_b=wire.PoseAnswer(x=found.T_a_b.x, y=found.T_a_b.y, theta=found.T_a_b.theta),
+        T_components=None if T is None else wire.PoseAnswer(x=T.x, y=T.y, theta=T.theta),
+        fits=found.fits,
+        reason=found.reason,
+        objections=list(found.objections),
+        checks=figures(found.checks),
+        limits=_limits(found.evidence.limits),
+        matched=_matched(found.evidence),
+        conflicts=found.evidence.conflicts.tolist(),
+    )
+
+
+def _matched(evidence: Evidence) -> list[wire.MatchedLines]:
+    return [
+        wire.MatchedLines(
+            reference=list(m.reference),
+            current=list(m.current),
+            overlap=m.overlap,
+            distance=m.distance,
+            angle=m.angle,
+        )
+        for m in evidence.matched
+    ]
 
 
 def _limits(limits: Mapping[str, Limit]) -> dict[str, wire.CheckLimit]:

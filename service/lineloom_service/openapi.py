@@ -19,6 +19,7 @@ _MODELS = (
     wire.ConfigChange,
     wire.MatchRequest,
     wire.ExportRequest,
+    wire.JoinRequest,
     wire.MatchScan,
     wire.LocalizeRequest,
     wire.Problem,

@@ -24,6 +24,7 @@ from lineloom_core.fusion.occupancy import Rays
 from lineloom_core.geometry import Pose
 from lineloom_core.mapping.answers.evidence import (
     Evidence,
+    JoinTrial,
     MatchedLines,
     RobotMove,
     RunnerUp,
@@ -85,6 +86,7 @@ class FakeMapper:
         self._scans: dict[str, list[tuple[str, int, float]]] = {}
         self._mounts: dict[str, Mount] = {}
         self._retracted: dict[str, int] = {}
+        self._joined: dict[str, Claim] = {}
 
     def add(self, robot: str, scan: Scan) -> Changes:
         if SECONDS_PER_SCAN:
@@ -128,6 +130,25 @@ class FakeMapper:
         self._version += 1
         self._link("restore", repr(constraint))
         self._retracted.pop(_name(constraint), None)
+
+    def join(self, claim: Claim) -> None:
+        self._version += 1
+        self._link("join", repr(claim))
+        self._joined[claim.constraint] = claim
+
+    def try_join(self, claim: Claim, guessed: bool) -> JoinTrial | None:
+        known = [(r, s, n) for r, rows in self._scans.items() for s, n, _ in rows]
+        ends = (claim.scan_a, claim.scan_b)
+        if any((s.robot, s.session, s.seq) not in known for s in ends):
+            return None
+        if not guessed and claim.scan_a.robot.startswith("alone"):
+            return None
+        a, b = (_component(s.robot) for s in ends)
+        return JoinTrial(
+            claim.constraint, a, b, "0", "1", Pose(1.0, 2.0, 0.5),
+            None if a == b else Pose(3.0, 4.0, 0.5), True, "said by an operator",
+            ("walls stand in free space",), {"matched": 300.0}, self.explain("k0-1"),
+        )  # fmt: skip
 
     def rays(self, component: str, settled: bool) -> Rays:
         """A lidar at the origin that sees five walls a metre to five metres ahead."""
@@ -323,7 +344,24 @@ class FakeMapper:
             )
             for k in keyframes[:1]
         ]
-        return accepted + rejected
+        said = [
+            ConstraintView(
+                id=name,
+                kind="operator",
+                state="retracted" if name in self._retracted else "accepted",
+                keyframe_a="0",
+                keyframe_b="0",
+                T_a_b=claim.T_a_b,
+                information=np.eye(3),
+                reason="said by an operator",
+                origin=claim.origin,
+                scan_a=claim.scan_a,
+                scan_b=claim.scan_b,
+            )
+            for name, claim in self._joined.items()
+        ]
+        rest = [c for c in rejected if c.id not in self._joined]
+        return accepted + rest + said
 
 
 def _unsealed(chapter: bytes) -> list[tuple[str, str, int, float]]:

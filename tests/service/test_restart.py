@@ -123,3 +123,25 @@ def _reasons_until_ready(port: int) -> set[str]:
             reasons.update(answer.json()["reasons"])
             time.sleep(0.005)
     raise AssertionError(f"never ready: {reasons}")
+
+
+def test_what_an_operator_said_is_there_after_a_kill(tmp_path: Path) -> None:
+    port = free_port()
+    url = f"http://127.0.0.1:{port}/v1/sites/s"
+    said = {"robot_a": "a", "robot_b": "b", "T_a_b": {"x": 0.5, "y": 0.25, "theta": 0.1}}
+    with server(tmp_path, port) as process:
+        for robot in ("a", "b"):
+            httpx.post(f"{url}/robots/{robot}/scans", json={"scans": _scans(range(5))})
+        with Client(f"http://127.0.0.1:{port}") as client:
+            client.wait_until_idle("s", 30.0)
+        made = httpx.post(f"{url}/constraints", json=said)
+        assert made.status_code == 201
+        name = made.json()["id"]
+        before = httpx.get(f"{url}/map").json()["lines"]
+        _kill(process)
+    with server(tmp_path, port) as process, Client(f"http://127.0.0.1:{port}") as client:
+        client.wait_until_idle("s", 30.0)
+        found = httpx.get(f"{url}/constraints", params={"kind": "operator"}).json()["constraints"]
+        assert [(c["id"], c["state"]) for c in found] == [(name, "accepted")]
+        assert httpx.get(f"{url}/map").json()["lines"] == before
+        _end(process)

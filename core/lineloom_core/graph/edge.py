@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lineloom_core.geometry import Pose
 
-EdgeKind = Literal["sequential", "loop", "rendezvous"]
+EdgeKind = Literal["sequential", "loop", "rendezvous", "operator"]
 
 
 @dataclass(frozen=True, eq=False, slots=True)

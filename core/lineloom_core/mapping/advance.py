@@ -1,6 +1,7 @@
 """What follows from one more keyframe: loops, places, merges, and second thoughts.
 
-Steps of `advance`: 1. the keyframe and its step enter the graph; 2. loops are closed with older
+Steps of `advance`: 1. the keyframe and its step enter the graph, and what an operator said of it;
+2. loops are closed with older
 keyframes that the graph says are near; 3. every few metres, a place is made of the last keyframes
 and looked for among all others, sooner where its robot lost its track, and what was left of that
 one is as well; 4. sets of candidates that agree are believed, components joined and tied together
@@ -19,6 +20,7 @@ from lineloom_core.mapping.facts.keyframe import Keyframe
 from lineloom_core.mapping.merging.candidates import consider
 from lineloom_core.mapping.merging.component_merged import ComponentMerged
 from lineloom_core.mapping.merging.contradictions import contradicted_by
+from lineloom_core.mapping.merging.join_said import join_said
 from lineloom_core.mapping.merging.near_loops import close_near_loop
 from lineloom_core.places import Place
 
@@ -31,8 +33,10 @@ is one for so many keyframes."""
 def advance(site: SiteMap, keyframe: Keyframe) -> Changes:
     """Take the next keyframe of the history; what is withdrawn is still believed in `site`."""
     step = site.append(keyframe)
-    moved = _near_loop_if_due(site, keyframe.id)
-    merges: list[ComponentMerged] = []
+    merges, said = join_said(site, keyframe.id)
+    for merge in merges:
+        _tie_after(site, merge)
+    moved = _near_loop_if_due(site, keyframe.id) or said
     contradicted: list[Constraint] = []
     for members in _due(site, keyframe, strayed=step is None) if keyframe.trusted else ():
         if not all(k in site.keyframes for k in members):

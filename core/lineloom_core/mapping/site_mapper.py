@@ -4,7 +4,7 @@ Steps of `SiteMapper.add`, for every scan of any robot:
  1. to 4. make a keyframe of it if it moved on (`front_end`): facts, which nothing later changes;
  5. to 7. close loops, recognise places, join components, optimise (`advance`): beliefs;
  8. where the scan contradicts what was believed, withdraw that and go through the history again
-    as if it had never been believed (`rebuild`). So do `retract`, `restore` and `forget`.
+    as if it had never been believed (`rebuild`). So do `retract`, `restore`, `join` and `forget`.
 
 No clock, no randomness, no I/O: the same log gives the same bits, also across `snapshot` and
 `resume`. Everything shown is a function of that state (`view`).
@@ -18,9 +18,10 @@ from dataclasses import replace
 from lineloom_core.codec import decode, encode
 from lineloom_core.fusion.occupancy import Rays
 from lineloom_core.mapping.advance import advance, contradicted_by_next
-from lineloom_core.mapping.answers.evidence import Action, Evidence, WhatIf
+from lineloom_core.mapping.answers.evidence import Action, Evidence, JoinTrial, WhatIf
 from lineloom_core.mapping.answers.explain import explain
 from lineloom_core.mapping.answers.factor_graph import FactorGraph
+from lineloom_core.mapping.answers.join_trial import join_trial
 from lineloom_core.mapping.answers.localisation import Localisation
 from lineloom_core.mapping.answers.localise import localise
 from lineloom_core.mapping.answers.ray_source import component_rays
@@ -37,7 +38,7 @@ from lineloom_core.mapping.belief.memory import Memory
 from lineloom_core.mapping.belief.rebuild import first_affected, rebuild
 from lineloom_core.mapping.belief.sameness import is_meant
 from lineloom_core.mapping.belief.site_map import SiteMap
-from lineloom_core.mapping.belief.standing import standing, unplaced_ends
+from lineloom_core.mapping.belief.standing import said_of, standing, unplaced_ends
 from lineloom_core.mapping.belief.verdicts import Verdicts
 from lineloom_core.mapping.changes import Changes
 from lineloom_core.mapping.config import MapperConfig
@@ -48,6 +49,7 @@ from lineloom_core.mapping.facts.ids import id_of
 from lineloom_core.mapping.facts.keyframe import Keyframe
 from lineloom_core.mapping.facts.ordinals import id_of_ordinal
 from lineloom_core.mapping.facts.robot_record import RobotRecord
+from lineloom_core.mapping.merging.operators_word import measured
 from lineloom_core.mapping.snapshot import Snapshot, SnapshotError
 from lineloom_core.scan import Mount, Scan
 
@@ -166,6 +168,35 @@ class SiteMapper:
             self._rebuild(verdicts.operators_only())
         elif isinstance(constraint, Claim):
             self._site.verdicts = verdicts.vouch(known)
+
+    def join(self, claim: Claim) -> None:
+        """Believe that two scans lie so, give or take what the matcher finds: an operator says so.
+
+        Of scans that are in no map it changes nothing, which the robots' health tells.
+        """
+        self._version += 1
+        said = self._said(claim, guessed=True)
+        self._note_unmet(claim, met=said is not None)
+        if said is not None:
+            before = self._site.verdicts.barred(said.id) or self._site.constraints.get(said.id)
+            said = replace(said, history=before.history if before else ())
+            said = said.moved_to("accepted", said.reason, self._version)
+            self._rebuild(self._site.verdicts.join(said).operators_only())
+
+    def try_join(self, claim: Claim, guessed: bool) -> JoinTrial | None:
+        """What `join` would come to; changes nothing. guessed: whether the claim says how they lie.
+
+        None for scans that are in no map, and where the two have nothing in common.
+        """
+        said = self._said(claim, guessed=guessed)
+        return None if said is None else join_trial(self._site, self._history, said)
+
+    def _said(self, claim: Claim, *, guessed: bool) -> Constraint | None:
+        found = said_of(claim, self._history, self._robots)
+        if found is None or not all(self._site.knows(k) for k in found[:2]) or found[0] == found[1]:
+            return None
+        a, b, T_a_b = found
+        return measured(self._site, self._history, claim, a, b, T_a_b if guessed else None)
 
     def what_if(self, constraint: str) -> WhatIf | None:
         """What retracting a constraint (or restoring a retracted one) would do; changes nothing.

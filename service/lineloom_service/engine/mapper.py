@@ -45,6 +45,10 @@ class Mapper(Protocol):
         """Take a retraction back."""
         ...
 
+    def join(self, claim: Claim) -> None:
+        """Believe what an operator says."""
+        ...
+
     def note(self) -> None:
         """Take an entry that changes nothing."""
         ...
@@ -91,6 +95,12 @@ def apply(mapper: Mapper, entry: LogEntry) -> None:
     if entry.kind in ("retract", "restore"):
         act = mapper.retract if entry.kind == "retract" else mapper.restore
         act(decode_claim(entry.body or b""))
+        return
+    if entry.kind == "join":
+        said = decode_claim(entry.body or b"")
+        if isinstance(said, str):
+            raise ValueError("a join entry has no claim")
+        mapper.join(said)
         return
     if entry.body is None or entry.session is None or entry.seq is None:
         raise ValueError("a scan entry has no body, session or seq")

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from lineloom_core.codec import CodecError, decode, encode
+from lineloom_core.mapping.belief.claim import Claim
 from lineloom_core.scan import Scan
 
 from lineloom_service.engine.mapper import load
@@ -30,6 +31,7 @@ _ANSWERS = "lineloom_core.mapping.answers"
 _QUESTIONS = {
     "what_if": _Question(tuple[str], f"{_ANSWERS}.evidence:WhatIf"),
     "explain": _Question(tuple[str], f"{_ANSWERS}.evidence:Evidence"),
+    "try_join": _Question(tuple[Claim, bool], f"{_ANSWERS}.evidence:JoinTrial"),
     "localise": _Question(tuple[Sequence[Scan]], f"{_ANSWERS}.localisation:Localisation"),
     "rays": _Question(tuple[str, bool], "lineloom_core.fusion.occupancy:Rays"),
     "factors": _Question(tuple[()], f"{_ANSWERS}.factor_graph:FactorGraph"),

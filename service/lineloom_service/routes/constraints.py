@@ -14,6 +14,7 @@ from lineloom_core.io.svg import to_svg
 from lineloom_core.mapping.answers.evidence import Evidence, WhatIf
 from lineloom_core.mapping.answers.site_view import ConstraintView, SiteView
 
+from lineloom_service.acting import act_and_follow, unknown
 from lineloom_service.answers import (
     JSON,
     IfNoneMatch,
@@ -26,17 +27,12 @@ from lineloom_service.asking import ask
 from lineloom_service.convert import to_constraint
 from lineloom_service.convert_evidence import to_detail, to_what_if
 from lineloom_service.dependencies import CurrentView, KnownSite, ServiceDep
-from lineloom_service.errors import INVALID_PARAMETER, UNKNOWN_CONSTRAINT, ProblemError
+from lineloom_service.errors import INVALID_PARAMETER, ProblemError
 from lineloom_service.map_frames import versioned
 from lineloom_service.openapi import NOT_MODIFIED, also_as
-from lineloom_service.service import Service
-from lineloom_service.store.actions import act
-from lineloom_service.store.codec import encode_claim
-from lineloom_service.store.records import ActionKind, SiteRecord
+from lineloom_service.store.records import SiteRecord
 
 _FORMATS = ("json", "svg")
-_FOLLOW_S = 20.0
-"""How long an action's answer waits for the map."""
 
 router = APIRouter(tags=["graph"])
 
@@ -94,7 +90,7 @@ async def get_constraint(
     if format == "json":
         return answer(to_detail(found, evidence))
     if evidence is None:
-        raise _unknown(site, constraint)
+        raise unknown(site, constraint)
     drawing = await asyncio.to_thread(draw_evidence, found, evidence)
     return Response(to_svg(drawing), media_type="image/svg+xml")
 
@@ -108,7 +104,8 @@ async def retract_constraint(
     Of a recognised meeting, all that says the same is refused with it. 200 with the constraint in
     its new state; 202 with it as it still is, where the map takes longer to follow.
     """
-    return await _act(service, site, view, constraint, "retract")
+    claim = _find(site, view, constraint).claim
+    return await act_and_follow(service, site, view, claim, "retract")
 
 
 @router.post("/v1/sites/{site}/constraints/{constraint}/restore", response_model=wire.Constraint)
@@ -116,7 +113,8 @@ async def restore_constraint(
     site: KnownSite, constraint: str, view: CurrentView, service: ServiceDep
 ) -> Response:
     """Take a retraction back, or overrule what the mapper has withdrawn."""
-    return await _act(service, site, view, constraint, "restore")
+    claim = _find(site, view, constraint).claim
+    return await act_and_follow(service, site, view, claim, "restore")
 
 
 @router.post("/v1/sites/{site}/constraints/{constraint}/what-if", response_model=wire.WhatIf)
@@ -127,35 +125,15 @@ async def what_if(
     _find(site, view, constraint)
     found: WhatIf | None = await ask(service, site, "what_if", constraint)
     if found is None:
-        raise _unknown(site, constraint)
+        raise unknown(site, constraint)
     return answer(to_what_if(found, view.version))
-
-
-async def _act(
-    service: Service, site: SiteRecord, view: SiteView, name: str, action: ActionKind
-) -> Response:
-    """Log an action, wait until the map has followed it, and return the constraint then."""
-    constraint = _find(site, view, name)
-    body = encode_claim(constraint.claim)
-    robot = constraint.scan_b.robot
-    position = await service.store.write(act, site.name, robot, action, body)
-    if position is None:
-        raise _unknown(site, name)
-    followed = await service.conductor.reached(site.id, position, _FOLLOW_S)
-    view = service.conductor.published(site.id).view
-    now = next((c for c in view.constraints if c.id == name), constraint)
-    return answer(to_constraint(now), status=200 if followed else 202)
 
 
 def _find(site: SiteRecord, view: SiteView, name: str) -> ConstraintView:
     for found in view.constraints:
         if found.id == name:
             return found
-    raise _unknown(site, name)
-
-
-def _unknown(site: SiteRecord, name: str) -> ProblemError:
-    return ProblemError(UNKNOWN_CONSTRAINT, f"no constraint {name!r} in site {site.name!r}")
+    raise unknown(site, name)
 
 
 def _after(view: SiteView, cursor: str | None) -> tuple[ConstraintView, ...]:

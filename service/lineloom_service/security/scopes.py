@@ -15,6 +15,7 @@ _BY_ROUTE: dict[tuple[str, str], Scope] = {
     ("POST", "/v1/sites/{site}/localize"): "read",
     ("POST", "/v1/match"): "read",
     ("POST", "/v1/sites/{site}/constraints/{constraint}/what-if"): "read",
+    ("POST", "/v1/sites/{site}/constraints/what-if"): "read",
 }
 
 

@@ -9,13 +9,18 @@ from lineloom_core.codec import storable
 
 from lineloom_service.store.config_entry import ConfigEntry
 
-EntryKind = Literal["scan", "late", "mount", "forget", "retract", "restore", "config", "order"]
+EntryKind = Literal[
+    "scan", "late", "mount", "forget", "retract", "restore", "join", "config", "order"
+]
 """late: a scan that came after its successors; the next `order` says where it belongs
 (`store.feed_order`)."""
 SCANS: frozenset[EntryKind] = frozenset({"scan", "late"})
 
-ActionKind = Literal["retract", "restore"]
-"""What an operator can do to a constraint; the entry's body is what it claims (`store.codec`)."""
+ActionKind = Literal["retract", "restore", "join"]
+"""What an operator can do to a constraint; the entry's body is what it claims (`store.codec`).
+
+join: say that it is so.
+"""
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,6 +39,7 @@ from lineloom.wire.export import (
 from lineloom.wire.floorplan import FloorPlanAnswer, Placement, PlanDifferences, PlanPiece
 from lineloom.wire.graph import Graph, GraphEdge, GraphNode, GraphSummary, Submap
 from lineloom.wire.ingest import IngestAnswer, RejectedScan, ScanBatch
+from lineloom.wire.join import JoinRequest, JoinTrial, PoseRequest
 from lineloom.wire.localize import (
     MAX_RUN,
     LocalizeAnswer,
@@ -94,6 +95,8 @@ __all__ = [
     "GraphSummary",
     "Health",
     "IngestAnswer",
+    "JoinRequest",
+    "JoinTrial",
     "Line",
     "LinePair",
     "LocalizeAnswer",
@@ -119,6 +122,7 @@ __all__ = [
     "PlanDifferences",
     "PlanPiece",
     "PoseAnswer",
+    "PoseRequest",
     "Problem",
     "Readiness",
     "RejectedScan",

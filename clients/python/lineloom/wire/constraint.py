@@ -9,7 +9,7 @@ from pydantic import Field
 from lineloom.wire.base import Answer, Covariance, Settled
 from lineloom.wire.pose import PoseAnswer
 
-ConstraintKind = Literal["sequential", "loop", "rendezvous"]
+ConstraintKind = Literal["sequential", "loop", "rendezvous", "operator"]
 ConstraintState = Literal["candidate", "accepted", "rejected", "retracted"]
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lineloom_core.check import Limit
 from lineloom_core.codec import storable
+from lineloom_core.geometry import Pose
 
 Action = Literal["retract", "restore"]
 
@@ -88,3 +89,26 @@ class Evidence:
     votes: float | None = None
     runner_up: RunnerUp | None = None
     margin: float | None = None
+
+
+@storable("join-trial")
+@dataclass(frozen=True, eq=False)
+class JoinTrial:
+    """What an operator's join would be: T_a_b as measured, and what speaks against it.
+
+    T_frames: the frame of b's component seen in that of a's; None within one component. fits:
+    whether the matcher could measure it. checks: by name. evidence: as of a constraint.
+    """
+
+    constraint: str
+    component_a: str
+    component_b: str
+    keyframe_a: str
+    keyframe_b: str
+    T_a_b: Pose
+    T_frames: Pose | None
+    fits: bool
+    reason: str
+    objections: tuple[str, ...]
+    checks: dict[str, float]
+    evidence: Evidence

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lineloom_core.check import Limit
-from lineloom_core.checks import DOUBTED, JOINED, NEAR_LOOP, RECOGNISED, TRACKED, WIDE_LOOP
+from lineloom_core.checks import DOUBTED, JOINED, NEAR_LOOP, RECOGNISED, SAID, TRACKED, WIDE_LOOP
 from lineloom_core.geometry import Pose, angle_difference
 from lineloom_core.mapping.answers.evidence import Evidence, MatchedLines, RunnerUp
 from lineloom_core.mapping.belief.constraint import Constraint
@@ -21,6 +21,7 @@ from lineloom_core.mapping.belief.place_making import make_place
 from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.config import MapperConfig
 from lineloom_core.mapping.facts.history import History
+from lineloom_core.mapping.merging.operators_word import place_around
 from lineloom_core.places import Place, conflicting_points, evidence_of, rivals
 
 _SAME_ANGLE = 0.12  # rad
@@ -30,8 +31,13 @@ _LEAST_OVERLAP = 0.2  # m
 
 def explain(site: SiteMap, history: History, constraint: Constraint) -> Evidence:
     """What speaks for a constraint and against it."""
-    reference, T_a_reference = _seen_by(site, history, constraint.place_a, constraint.keyframe_a)
-    current, T_b_current = _seen_by(site, history, constraint.place_b, constraint.keyframe_b)
+    (reference, T_a_reference), (current, T_b_current) = (
+        _seen_by(site, history, constraint, *end)
+        for end in (
+            (constraint.place_a, constraint.keyframe_a),
+            (constraint.place_b, constraint.keyframe_b),
+        )
+    )
     T_a_current = constraint.T_a_b @ T_b_current
     lines_a, lines_b = _moved(T_a_reference, reference), _moved(T_a_current, current)
     T_reference_current = T_a_reference.between(T_a_current)
@@ -49,11 +55,16 @@ def explain(site: SiteMap, history: History, constraint: Constraint) -> Evidence
     )
 
 
-def _seen_by(site: SiteMap, history: History, place: int, keyframe: int) -> tuple[Place, Pose]:
+def _seen_by(
+    site: SiteMap, history: History, c: Constraint, place: int, keyframe: int
+) -> tuple[Place, Pose]:
     """The place of a recognition, else what the keyframe alone shows; and T_keyframe_place.
 
     The history is asked: what is barred may rest on keyframes that the map has let go.
     """
+    if c.kind == "operator" and site.knows(keyframe):
+        around, T_around_keyframe = place_around(site, history, keyframe)
+        return around, T_around_keyframe.inverse()
     known = site.places.get(place)
     if known is not None and keyframe in known.keyframes:
         return known, known.poses[known.keyframes.index(keyframe)].inverse()
@@ -62,9 +73,12 @@ def _seen_by(site: SiteMap, history: History, place: int, keyframe: int) -> tupl
 
 def _limits(c: Constraint, config: MapperConfig) -> dict[str, Limit]:
     """What every figure was held to, for the way in which the constraint came about."""
-    ways = {"sequential": (TRACKED,)}.get(c.kind, (NEAR_LOOP,))
+    near = (TRACKED,) if c.kind == "sequential" else (NEAR_LOOP,)
+    ways = near if c.place_a < 0 else (RECOGNISED, WIDE_LOOP, JOINED)
+    if c.kind == "operator":
+        ways = (RECOGNISED, JOINED, SAID)
     limits: dict[str, Limit] = {}
-    for checks in (*(ways if c.place_a < 0 else (RECOGNISED, WIDE_LOOP, JOINED)), DOUBTED):
+    for checks in (*ways, DOUBTED):
         limits |= checks.limits(getattr(config, checks.section), c.checks)
     return limits
 

@@ -10,9 +10,9 @@ from lineloom_core.geometry import Pose
 from lineloom_core.mapping.belief.constraint_state import ConstraintKind
 from lineloom_core.mapping.facts.scan_name import ScanName
 
-Origin = Literal["step", "near", "recognition"]
+Origin = Literal["step", "near", "recognition", "operator"]
 """How a constraint came about: tracked from keyframe to keyframe, registered where the graph
-predicted two keyframes near each other, or one place recognised in another."""
+predicted two keyframes near each other, one place recognised in another, or said by an operator."""
 
 
 @storable("claim")

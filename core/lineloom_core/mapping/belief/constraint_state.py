@@ -7,7 +7,7 @@ from typing import Literal
 
 from lineloom_core.codec import storable
 
-ConstraintKind = Literal["sequential", "loop", "rendezvous"]
+ConstraintKind = Literal["sequential", "loop", "rendezvous", "operator"]
 ConstraintState = Literal["candidate", "accepted", "rejected", "retracted"]
 
 

@@ -33,10 +33,9 @@ def is_barred(site: SiteMap, found: Constraint) -> bool:
 
 
 def is_approved(site: SiteMap, constraint: Constraint) -> bool:
-    """Whether an operator has restored a constraint, so that it is not withdrawn again."""
-    return constraint.id in site.verdicts.approved or any(
-        is_meant(site, a, constraint) for a in site.verdicts.vouched.values()
-    )
+    """Whether an operator has said or restored a constraint, so that it is not withdrawn."""
+    said = constraint.kind == "operator" or constraint.id in site.verdicts.approved
+    return said or any(is_meant(site, a, constraint) for a in site.verdicts.vouched.values())
 
 
 def _recognitions(site: SiteMap) -> list[Constraint]:

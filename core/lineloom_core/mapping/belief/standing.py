@@ -26,7 +26,8 @@ def standing(
     claim: Claim, history: History, robots: Mapping[str, RobotRecord], config: PlaceConfig
 ) -> Constraint | None:
     """What a verdict on a claim bars or approves when it comes up; None of scans nobody knows."""
-    earlier = {"step": 0.0, "near": NEAR, "recognition": config.span + 2.0 * config.stride}
+    earlier = {"step": 0.0, "near": NEAR, "recognition": config.span + 2.0 * config.stride,
+               "operator": 0.0}  # fmt: skip
     ends = [
         _anchored(name, history, robots, earlier[claim.origin])
         for name in (claim.scan_a, claim.scan_b)
@@ -45,6 +46,17 @@ def standing(
         reason="named by an operator, and not measured here",
         claim=claim,
     )
+
+
+def said_of(
+    claim: Claim, history: History, robots: Mapping[str, RobotRecord]
+) -> tuple[int, int, Pose] | None:
+    """The two keyframes that a claim is of, and T_a_b between them; None of scans nobody knows."""
+    ends = [_anchored(name, history, robots, 0.0) for name in (claim.scan_a, claim.scan_b)]
+    if ends[0] is None or ends[1] is None:
+        return None
+    (a, T_a_scan), (b, T_b_scan) = ends[0], ends[1]
+    return a, b, T_a_scan @ claim.T_a_b @ T_b_scan.inverse()
 
 
 def unplaced_ends(

@@ -59,9 +59,9 @@ def _may_go(site: SiteMap, place: Place) -> bool:
 
 def _holds_something(site: SiteMap, keyframe: int) -> bool:
     """Whether a meeting rests on a keyframe, or a verdict, which somebody may look at again."""
-    if any(edge.kind == "rendezvous" for edge in site.graph.edges_at(keyframe)):
+    if any(edge.kind in ("rendezvous", "operator") for edge in site.graph.edges_at(keyframe)):
         return True
-    return any(keyframe in (c.keyframe_a, c.keyframe_b) for c in site.verdicts.all_barred())
+    return any(keyframe in (c.keyframe_a, c.keyframe_b) for c in site.verdicts.all_told())
 
 
 def _unneeded(site: SiteMap, gone: list[Place]) -> list[list[int]]:

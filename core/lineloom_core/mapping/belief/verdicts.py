@@ -1,4 +1,4 @@
-"""What is not to be believed, whatever the scans say: retracted by an operator, or withdrawn.
+"""What is believed or not whatever the scans say: joined or retracted by an operator, or withdrawn.
 
 A verdict stands above the evidence: a pair that was retracted is never proposed again, and what
 says the same as a retracted recognition is refused with it.
@@ -21,12 +21,14 @@ class Verdicts:
 
     approved: restored by an operator after they had been withdrawn, so never withdrawn again.
     vouched: restored though nothing was withdrawn yet that they mean (`sameness`), by id.
+    joined: what an operator says is so, measured when it was said, by id.
     """
 
     retracted: Mapping[str, Constraint] = field(default_factory=dict)
     withdrawn: Mapping[str, Constraint] = field(default_factory=dict)
     approved: frozenset[str] = frozenset()
     vouched: Mapping[str, Constraint] = field(default_factory=dict)
+    joined: Mapping[str, Constraint] = field(default_factory=dict)
 
     def barred(self, constraint_id: str) -> Constraint | None:
         """The retracted or withdrawn constraint of this id, if there is one."""
@@ -45,6 +47,19 @@ class Verdicts:
         """Everything that is not to be believed, oldest first."""
         return (*self.retracted.values(), *self.withdrawn.values())
 
+    def all_told(self) -> tuple[Constraint, ...]:
+        """Everything that must not be let go of, because somebody may look at it again."""
+        return (*self.all_barred(), *self.joined.values())
+
+    def join(self, constraint: Constraint) -> Verdicts:
+        """This one is so, says an operator."""
+        return replace(
+            self,
+            joined={**self.joined, constraint.id: constraint},
+            retracted=_without(self.retracted, constraint.id),
+            withdrawn=_without(self.withdrawn, constraint.id),
+        )
+
     def retract(self, constraint: Constraint) -> Verdicts:
         """Also this one is not to be believed, says an operator."""
         return replace(
@@ -53,6 +68,7 @@ class Verdicts:
             withdrawn=_without(self.withdrawn, constraint.id),
             approved=self.approved - {constraint.id},
             vouched=_without(self.vouched, constraint.id),
+            joined=_without(self.joined, constraint.id),
         )
 
     def withdraw(self, constraints: tuple[Constraint, ...]) -> Verdicts:
@@ -61,6 +77,10 @@ class Verdicts:
 
     def restore(self, constraint_id: str) -> Verdicts:
         """An operator takes the word back, or overrules the mapper's."""
+        gone = self.retracted.get(constraint_id)
+        if gone is not None and gone.kind == "operator":
+            said = next(move.reason for move in gone.history if move.state == "accepted")
+            return self.join(replace(gone, state="accepted", reason=said))
         overruled = {constraint_id} if constraint_id in self.withdrawn else set()
         return replace(
             self,
@@ -81,21 +101,26 @@ class Verdicts:
 
     def moved(self, other: Verdicts) -> tuple[Constraint, ...]:
         """Constraints on which the two differ."""
-        groups = ((self.retracted, other.retracted), (self.withdrawn, other.withdrawn))
+        groups = (
+            (self.retracted, other.retracted),
+            (self.withdrawn, other.withdrawn),
+            (self.joined, other.joined),
+        )
         return tuple(
             {**mine, **theirs}[name]
             for mine, theirs in groups
-            for name in sorted(mine.keys() ^ theirs.keys())
+            for name in sorted(mine.keys() | theirs.keys())
+            if mine.get(name) is not theirs.get(name)
         )
 
     def without(self, keyframes: set[int]) -> Verdicts:
         """The same where these keyframes are forgotten."""
         kept = (
             {i: c for i, c in group.items() if not {c.keyframe_a, c.keyframe_b} & keyframes}
-            for group in (self.retracted, self.withdrawn, self.vouched)
+            for group in (self.retracted, self.withdrawn, self.vouched, self.joined)
         )
-        retracted, withdrawn, vouched = kept
-        return Verdicts(retracted, withdrawn, self.approved, vouched)
+        retracted, withdrawn, vouched, joined = kept
+        return Verdicts(retracted, withdrawn, self.approved, vouched, joined)
 
 
 def _without(items: Mapping[str, Constraint], key: str) -> dict[str, Constraint]:

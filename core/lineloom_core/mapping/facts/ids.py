@@ -15,10 +15,11 @@ from typing import Literal
 
 from lineloom_core.mapping.facts.scan_name import ScanName
 
-Named = Literal["keyframe", "place", "component", "step", "near", "recognition"]
+Named = Literal["keyframe", "place", "component", "step", "near", "recognition", "operator"]
 
 _LETTERS: dict[Named, str] = {
-    "keyframe": "k", "place": "p", "component": "c", "step": "s", "near": "n", "recognition": "r"
+    "keyframe": "k", "place": "p", "component": "c", "step": "s", "near": "n", "recognition": "r",
+    "operator": "o",
 }  # fmt: skip
 
 
@@ -28,7 +29,7 @@ def id_of(what: Named, *scans: ScanName) -> str:
 
     keyframe: its scan. place: the scan of its last keyframe. component: that of the first keyframe
     of its oldest track. step: the scan that it leads to. near: both scans that were registered.
-    recognition: the scans of both places.
+    recognition: the scans of both places. operator: both scans that were said to be near.
     """
     rows = sorted([s.robot, s.session, s.seq, *([s.repeat] if s.repeat else [])] for s in scans)
     digest = blake2b(json.dumps(rows).encode(), digest_size=10, person=what.encode()).digest()

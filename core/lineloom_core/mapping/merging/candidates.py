@@ -83,7 +83,7 @@ def _lies_apart(site: SiteMap, other: Place, place: Place) -> bool:
 def _try(site: SiteMap, reference: Place, current: Place) -> Constraint | None:
     """Recognise one place in another; a plausible outcome becomes a candidate."""
     name = site.id_of("recognition", reference.id, current.id)
-    if site.verdicts.barred(name):
+    if site.verdicts.barred(name) or name in site.verdicts.joined:
         return None
     found = site.memory.recognise(reference, current)
     if found.T_reference_current is None:

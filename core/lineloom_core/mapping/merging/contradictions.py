@@ -140,7 +140,7 @@ def _weakest_meeting(site: SiteMap, track_a: str, track_b: str) -> list[Constrai
     meetings: dict[tuple[str, ...], list[Constraint]] = {}
     links = nx.Graph()
     for c in site.constraints.values():
-        if c.kind == "rendezvous" and c.state == "accepted":
+        if c.kind in ("rendezvous", "operator") and c.state == "accepted":
             meetings.setdefault(c.consistency_set, []).append(c)
             ends = (site.track(c.keyframe_a).id, site.track(c.keyframe_b).id)
             links.add_edge(*ends, meeting=c.consistency_set)

@@ -43,17 +43,28 @@ def overlap_of_sets(
         count_steady(site.places[c.place_a], site.places[c.place_b], T_places(site, c))
         for c in chosen
     )
-    elsewhere = _total(
-        count_steady_nearby(a, b, poses[a.anchor].between(poses[b.anchor]))
-        for a in near_a
-        for b in near_b
-        if poses[a.anchor].distance(poses[b.anchor]) <= site.config.places.span
-    )
     return {
         "set_seen": float(matched + missing),
         "set_missing": max(missing_share(matched, missing) - usual, 0.0),
-        "map_missing": max(missing_share(*elsewhere) - usual, 0.0),
+        "map_missing": max(missing_elsewhere(site, near_a, near_b, poses) - usual, 0.0),
     }
+
+
+def missing_elsewhere(
+    site: SiteMap, near_a: list[Place], near_b: list[Place], poses: Mapping[int, Pose]
+) -> float:
+    """Share of what stood still that is missing wherever places of two maps overlap.
+
+    poses: of the places' anchors, all in one frame.
+    """
+    return missing_share(
+        *_total(
+            count_steady_nearby(a, b, poses[a.anchor].between(poses[b.anchor]))
+            for a in near_a
+            for b in near_b
+            if poses[a.anchor].distance(poses[b.anchor]) <= site.config.places.span
+        )
+    )
 
 
 def T_places(site: SiteMap, c: Constraint) -> Pose:
