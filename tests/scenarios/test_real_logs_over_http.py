@@ -1,7 +1,4 @@
-"""Real buildings as a user would map them: the command line, a real service, the SDK.
-
-Both are replayed at the same time, to two sites of one service, which maps them side by side.
-"""
+"""Real buildings as a user would map them: the command line, a real service, the SDK."""
 
 from __future__ import annotations
 
@@ -9,7 +6,6 @@ import json
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack
 from itertools import accumulate
 from typing import Any
 
@@ -23,46 +19,33 @@ from tests.scenarios.real_logs import CSAIL, FR079, RealLog
 
 pytestmark = pytest.mark.scenario
 
-LOGS = {"csail": CSAIL, "freiburg": FR079}
-"""By the site that each is replayed to."""
-
 
 @pytest.fixture(scope="module")
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ChildService]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("LINELOOM_WORKERS", str(len(LOGS)))
-        with ChildService(tmp_path_factory.mktemp("data")) as started:
-            started.wait_until_ready()
-            yield started
+    with ChildService(tmp_path_factory.mktemp("data")) as started:
+        started.wait_until_ready()
+        yield started
 
 
-@pytest.fixture(scope="module")
-def replays(service: ChildService) -> Iterator[dict[str, subprocess.Popen[str]]]:
-    """`lineloom replay LOG --split 3 --no-odometry` of every log that is there, under way."""
-    with ExitStack() as running:
-        yield {
-            site: running.enter_context(replay(log, service, site))
-            for site, log in LOGS.items()
-            if log.log.is_file()
-        }
-
-
-def replay(log: RealLog, service: ChildService, site: str) -> subprocess.Popen[str]:
-    """Start it; it prints its figures."""
+def replay(log: RealLog, service: ChildService, site: str) -> dict[str, Any]:
+    """`lineloom replay LOG --split 3 --no-odometry`: the figures that it prints."""
     command = [sys.executable, "-m", "lineloom.cli", "replay", str(log.log)]
     command += ["--split", "3", "--no-odometry", "--site", site, "--url", service.url, "--json"]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    figures: dict[str, Any] = json.loads(done.stdout)
+    return figures
 
 
-@pytest.mark.parametrize("site", LOGS)
+@pytest.mark.parametrize(
+    ("site", "log"),
+    [("csail", CSAIL), pytest.param("freiburg", FR079, marks=pytest.mark.long)],
+)
 def test_a_replayed_log_becomes_one_right_map(
-    site: str, service: ChildService, replays: dict[str, subprocess.Popen[str]]
+    site: str, log: RealLog, service: ChildService
 ) -> None:
-    log = LOGS[site]
     log.require()
-    output, errors = replays[site].communicate()
-    assert replays[site].returncode == 0, errors
-    figures: dict[str, Any] = json.loads(output)
+    figures = replay(log, service, site)
     assert (figures["accepted"], figures["rejected"]) == (log.scans, 0)
     streams = load([log.log], split_into=3, odometry=False)
     first_row = accumulate((len(s.scans) for s in streams), initial=0)

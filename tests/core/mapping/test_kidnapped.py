@@ -145,18 +145,24 @@ def play(scans: list[SimulatedScan]) -> Mapped:
     return Mapped(mapper.view(), started, withdrawn)
 
 
-LIDARS = pytest.mark.parametrize("lidar", [sick_lms200(), scanner_360()], ids=["sick", "360"])
+PAUSES = {
+    "carried while off": (30.0, "restarted"),
+    "restarted at once": (0.2, "restarted"),
+    "offline for hours": (7200.0, "0"),
+}
+"""Seconds between two drives, and the session of the second."""
 
 
 @pytest.mark.parametrize(
-    ("pause_s", "session"),
-    [(30.0, "restarted"), (0.2, "restarted"), (7200.0, "0")],
-    ids=["carried while off", "restarted at once", "offline for hours"],
-)
-@pytest.mark.parametrize(
-    ("lidar", "room"),
-    [(sick_lms200(), 1), (scanner_360(), 5)],
-    ids=["in place", "into another room"],
+    ("pause_s", "session", "lidar", "room"),
+    [
+        pytest.param(*PAUSES["carried while off"], scanner_360(), 5, id="into another room"),
+        pytest.param(*PAUSES["restarted at once"], sick_lms200(), 1, id="at once in place"),
+        pytest.param(*PAUSES["offline for hours"], sick_lms200(), 1, id="hours later in place"),
+        pytest.param(*PAUSES["carried while off"], sick_lms200(), 1, marks=pytest.mark.long),
+        pytest.param(*PAUSES["restarted at once"], scanner_360(), 5, marks=pytest.mark.long),
+        pytest.param(*PAUSES["offline for hours"], scanner_360(), 5, marks=pytest.mark.long),
+    ],
 )
 def test_it_starts_anew_and_is_known_again(
     lidar: Lidar, pause_s: float, session: str, room: int
@@ -221,12 +227,15 @@ def is_cut_at(mapped: Mapped, at: int) -> bool:
     )
 
 
-def test_a_jump_is_seen_at_once_or_cut_by_what_comes_after() -> None:
+@pytest.mark.parametrize(
+    ("seeds", "cut"), [(range(8), 3), pytest.param(range(20), 8, marks=pytest.mark.long)]
+)
+def test_a_jump_is_seen_at_once_or_cut_by_what_comes_after(seeds: range, cut: int) -> None:
     # Half the view is a corner that all rooms have alike: often the second scan fits as well. One
     # in twenty may go by: furniture is drawn at random, and two rooms may come out much alike.
-    jumps = judge_jumps(range(20), sick_lms200(), [0])
+    jumps = judge_jumps(seeds, sick_lms200(), [0])
     print(jumps)
-    assert jumps.cut >= 8, f"the drives are no test: {jumps}"
+    assert jumps.cut >= cut, f"the drives are no test: {jumps}"
     assert len(jumps.wrong) <= 1, str(jumps)
 
 
@@ -238,21 +247,23 @@ def test_of_many_jumps_hardly_any_goes_by(lidar: Lidar) -> None:
     assert len(jumps.wrong) <= 3, str(jumps)
 
 
-def test_no_step_of_a_drive_among_people_is_taken_for_a_jump() -> None:
+@pytest.mark.parametrize("seeds", [range(6), pytest.param(range(20), marks=pytest.mark.long)])
+def test_no_step_of_a_drive_among_people_is_taken_for_a_jump(seeds: range) -> None:
     # None may: a right drive that is cut loses what it knew, and no operator would know why.
     cut: list[str] = []
-    for seed in range(20):
+    for seed in seeds:
         fleet = Fleet.touring(
             rooms_in_a_row(seed).world, robots=1, seed=seed, duration_s=30.0, lidar=sick_lms200(),
             people=4,
         )  # fmt: skip
         cut += [f"building {seed}: {c}" for c in play(list(fleet.scans())).withdrawn]
-    print(f"of 20 drives among people {len(cut)} were cut: {cut}")
+    print(f"of {len(seeds)} drives among people {len(cut)} were cut: {cut}")
     assert cut == []
 
 
-@LIDARS
-@pytest.mark.parametrize("room", [2, 5])
+@pytest.mark.parametrize(
+    ("lidar", "room"), [(sick_lms200(), 2), (scanner_360(), 5)], ids=["sick", "360"]
+)
 def test_in_rooms_that_are_alike_to_the_last_chair_it_stays_apart(lidar: Lidar, room: int) -> None:
     world = rooms_in_a_row(bare=True).world
     first = drive(world, HOME, lidar, 3)

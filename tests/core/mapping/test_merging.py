@@ -22,6 +22,10 @@ from lineloom_lab.simulation import (
 
 from tests.core.mapping.drives import component_error, mapped
 
+SEEDS = pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in (1, 2))]
+)
+
 
 def worst_merge(view: SiteView, scans: list[SimulatedScan]) -> float:
     """Greatest error [m] of a pose in any component that holds more than one robot; 0 if none."""
@@ -29,7 +33,7 @@ def worst_merge(view: SiteView, scans: list[SimulatedScan]) -> float:
     return max((component_error(view, scans, c).max for c in shared), default=0.0)
 
 
-@pytest.fixture(scope="module", params=[0, 3])
+@pytest.fixture(scope="module", params=[0, pytest.param(3, marks=pytest.mark.long)])
 def office(request: pytest.FixtureRequest) -> tuple[SiteView, list[SimulatedScan]]:
     """Three robots on an office floor for a minute and a half."""
     fleet = Fleet.office(seed=request.param, robots=3, duration_s=90.0, lidar=sick_lms200())
@@ -83,12 +87,13 @@ def together(*robots: SimulatedRobot) -> list[SimulatedScan]:
 @pytest.mark.parametrize(
     "worlds",
     [
-        (office_floor(0), office_floor(5)),
-        (rooms(0), rooms(1)),
-        (corridors(0), corridors(1)),
-        (office_floor(0), corridors(3)),
+        pytest.param((office_floor(0), office_floor(5)), id="two offices"),
+        pytest.param((rooms(0), rooms(1)), id="two flats", marks=pytest.mark.long),
+        pytest.param((corridors(0), corridors(1)), id="two corridors"),
+        pytest.param(
+            (office_floor(0), corridors(3)), id="office and corridors", marks=pytest.mark.long
+        ),
     ],
-    ids=["two offices", "two flats", "two corridors", "office and corridors"],
 )
 def test_robots_in_different_buildings_are_never_merged(worlds: tuple[World, World]) -> None:
     scans = together(robot_in(worlds[0], "a", 1), robot_in(worlds[1], "b", 2))
@@ -97,7 +102,7 @@ def test_robots_in_different_buildings_are_never_merged(worlds: tuple[World, Wor
     assert view.merged_into == {}
 
 
-@pytest.mark.parametrize("seed", range(3))
+@SEEDS
 def test_a_corridor_that_repeats_itself_never_merges_wrongly(seed: int) -> None:
     world = long_corridor()
     left = SimulatedRobot.through(
@@ -119,7 +124,7 @@ def test_a_corridor_that_repeats_itself_never_merges_wrongly(seed: int) -> None:
     assert worst_merge(view, scans) < 1.0
 
 
-@pytest.mark.parametrize("seed", range(3))
+@SEEDS
 def test_robots_that_share_a_repeating_corridor_merge_rightly_or_not_at_all(seed: int) -> None:
     fleet = Fleet.touring(
         long_corridor(), robots=2, seed=seed, duration_s=90.0, lidar=sick_lms200()

@@ -72,7 +72,7 @@ class Followed:
 @pytest.fixture(scope="module")
 def drives() -> list[Followed]:
     found = []
-    for seed in range(20):
+    for seed in range(8):
         world, lidar = rooms(seed % 5), sick_lms200()
         robot = SimulatedRobot.wandering("r", world, lidar=lidar, seed=seed, duration_s=9.0)
         scans = list(robot.scans())
@@ -83,8 +83,8 @@ def drives() -> list[Followed]:
 @pytest.mark.parametrize("fault", FAULTS)
 def test_wrong_odometry_is_as_good_as_none(fault: str, drives: list[Followed]) -> None:
     worse = [seed for seed, d in enumerate(drives) if d.is_better_than(FAULTS[fault], seed)]
-    print(f"odometry {fault}: as good as none on {20 - len(worse)} of 20 drives; worse: {worse}")
-    assert len(worse) <= 1
+    print(f"odometry {fault}: as good as none on {8 - len(worse)} of 8 drives; worse: {worse}")
+    assert worse == []
 
 
 def room_and_corridor() -> World:
@@ -115,14 +115,14 @@ def out_of_a_room() -> list[SimulatedScan]:
 
 def test_right_odometry_cures_the_plain_corridor() -> None:
     astray, cured = [], []
-    for seed in range(20):
+    for seed in range(8):
         scans = driven_out_of_a_room(seed, 360, 13.0)
         astray.append(track_errors(scans, follow(scans))[-1, 0] > 0.1)
         right = faulty(scans, lambda i, p, rng: p, 0)
         cured.append(track_errors(right, follow(right))[:, 0].max() < 0.1)
-    print(f"plain corridor: astray on {sum(astray)} of 20 drives, with odometry {20 - sum(cured)}")
-    assert sum(astray) >= 10, "nothing but the wheels can know"
-    assert sum(cured) >= 19
+    print(f"plain corridor: astray on {sum(astray)} of 8 drives, with odometry {8 - sum(cured)}")
+    assert sum(astray) >= 4, "nothing but the wheels can know"
+    assert all(cured)
 
 
 @pytest.mark.parametrize("fault", ["three times too long", "turns the wrong way", "mirrored"])
@@ -199,7 +199,7 @@ def no_worse_than_wheels(scans: list[SimulatedScan], found: list[Tracked]) -> bo
 def test_wheels_carry_the_heading_in_a_round_tank() -> None:
     """Its middle is known, and the heading is the wheels': it is no worse than they are."""
     lidar, no_worse = replace(scanner_360(), rate_hz=3.0), []
-    for seed in range(6):
+    for seed in range(4):
         tank = circle(4.5 + 0.3 * seed, 240)
         robot = SimulatedRobot.through(
             "r", tank, ALONG, lidar=lidar, seed=seed, odometry=DriftingOdometry()
@@ -211,8 +211,8 @@ def test_wheels_carry_the_heading_in_a_round_tank() -> None:
         steps = [f for f in found if f.is_keyframe][1:]
         assert np.median([max(np.linalg.eigvalsh(f.information)[0], 0.0) for f in steps]) < 1e-6
         no_worse.append(no_worse_than_wheels(scans, found))
-    print(f"round tank: no worse than wheels on {sum(no_worse)} of 6 drives")
-    assert sum(no_worse) >= 5
+    print(f"round tank: no worse than wheels on {sum(no_worse)} of 4 drives")
+    assert sum(no_worse) >= 3
 
 
 def test_wheels_carry_a_narrow_view_round_corners() -> None:
@@ -254,7 +254,7 @@ def test_wheels_carry_a_narrow_view_round_corners() -> None:
 def test_who_is_carried_with_wheels_that_stand_still_is_not_carried_by_them() -> None:
     """Somebody lifts the robot into another room: wheels say that it stands."""
     followed = 0
-    for seed in range(10):
+    for seed in range(5):
         here, there = rooms(seed), rooms(seed + 20)
         lidar = scanner_360()
         robot = SimulatedRobot.wandering("r", here, lidar=lidar, seed=seed, duration_s=6.0)
