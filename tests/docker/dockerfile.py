@@ -88,7 +88,7 @@ class Run:
             source, goal = self.source / name, self.at(target)
             if source.is_dir():
                 ignored = shutil.ignore_patterns("__pycache__", "*.egg-info", ".venv")
-                shutil.copytree(source, goal, ignore=ignored)
+                shutil.copytree(source, goal, ignore=ignored, dirs_exist_ok=True)
             else:
                 goal = goal / source.name if target.endswith("/") else goal
                 goal.parent.mkdir(parents=True, exist_ok=True)

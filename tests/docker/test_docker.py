@@ -1,8 +1,10 @@
-"""The image and the compose file, as far as they can be proven without a Docker engine."""
+"""The image and the compose file: what they say, their steps, and the image with an engine."""
 
 from __future__ import annotations
 
+import re
 import subprocess
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -32,6 +34,38 @@ def test_two_stages_and_the_second_has_no_sources() -> None:
         "--from=build /opt/lineloom /opt/lineloom",
         "docker/healthcheck.py /opt/lineloom/healthcheck.py",
     ]
+
+
+def test_dependencies_come_before_sources_and_pip_stays_behind() -> None:
+    rests = [step.rest for step in STEPS]
+    others = next(i for i, rest in enumerate(rests) if "requirements.txt" in rest)
+    kernels = next(i for i, rest in enumerate(rests) if "warm_up" in rest)
+    core, service = rests.index("core core"), rests.index("service service")
+    assert others < core < kernels < service
+    assert "python3 -m venv --without-pip /opt/lineloom" in " ".join(rests)
+    # The base is one argument for both stages.
+    assert [s.rest.split()[0] for s in STEPS if s.name == "FROM"] == 2 * ["${BASE}"]
+
+
+def test_old_engines_understand_the_health_check() -> None:
+    assert "--start-interval" not in _last("HEALTHCHECK").rest
+
+
+def test_what_is_asked_for_of_others_is_all_and_nothing_of_ours() -> None:
+    folders = [str(ROOT / name) for name in ("core", "clients/python", "service")]
+    command = [sys.executable, str(ROOT / "docker" / "requirements.py"), *folders]
+    lines = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+    assert not [line for line in lines if line.startswith("lineloom")]
+    names = {re.split(r"[^\w.-]", line)[0] for line in lines}
+    assert {"numba", "gtsam", "httpx", "fastapi", "backports.zstd"} <= names
+
+
+@pytest.mark.long
+def test_the_image_is_built_and_run() -> None:
+    done = subprocess.run([ROOT / "docker" / "check"], capture_output=True, text=True, check=False)
+    if done.returncode == 3:
+        pytest.skip(done.stderr.strip())
+    assert done.returncode == 0, done.stderr
 
 
 def test_it_runs_as_nobody_in_particular() -> None:
