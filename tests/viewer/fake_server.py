@@ -32,6 +32,8 @@ class FakeServer:
         self.exists = True
         self.wants_token = False
         self.streams = True
+        self.slow_s = 0.0
+        """How long the answer to what a join would be takes."""
         self.posted: list[tuple[str, Any]] = []
         self.url = ""
         self._news: list[dict[str, Any]] = []
@@ -100,7 +102,7 @@ class FakeServer:
 
         @router.get(f"{_SITE}/constraints")
         def constraints(request: Request, kind: str) -> Response:
-            found = site.constraints if kind == "rendezvous" else []
+            found = [c for c in site.constraints if c["kind"] == kind]
             page = {"version": site.version, "constraints": found, "next_cursor": None}
             return self._versioned(request, page)
 
@@ -143,6 +145,19 @@ class FakeServer:
 
     def _actions(self) -> APIRouter:
         router = APIRouter()
+
+        @router.post(f"{_SITE}/constraints/what-if")
+        async def try_join(request: Request) -> Any:
+            self.posted.append(("what-if", await request.json()))
+            if self.slow_s:
+                await asyncio.sleep(self.slow_s)
+            return self.site.try_join()
+
+        @router.post(f"{_SITE}/constraints")
+        async def join(request: Request) -> Any:
+            said = await request.json()
+            self.posted.append(("join", said))
+            return JSONResponse(self.site.say(said), 201)
 
         @router.post(f"{_SITE}/constraints/{{identity}}/{{action}}")
         async def act(identity: str, action: str) -> Any:

@@ -35,10 +35,43 @@ class FakeSite:
         """Retract or restore a constraint; the components follow."""
         constraint = next(c for c in self.constraints if c["id"] == identity)
         state = "retracted" if action == "retract" else "accepted"
+        if action == "confirm":
+            constraint["kind"] = "operator"
         constraint.update(state=state, reason=f"{action}ed by an operator")
         self.version += 1
         self.joined = any(c["state"] == "accepted" for c in self.constraints)
         return constraint
+
+    def try_join(self) -> dict[str, Any]:
+        """Answer what laying c1 on c0 would come to."""
+        x, y, theta = T_C0_C1
+        of = evidence(_candidate("o-said"))
+        return {
+            "constraint": "o-said",
+            "component_a": "c0",
+            "component_b": "c1",
+            "keyframe_a": "k0",
+            "keyframe_b": "k1",
+            "T_a_b": {"x": 1.0, "y": 0.5, "theta": 0.25},
+            "T_components": {"x": x, "y": y, "theta": theta},
+            "fits": True,
+            "reason": "said by an operator; against it: walls stand in free space",
+            "objections": ["walls stand in free space"],
+            "checks": of["checks"],
+            "limits": of["limits"],
+            "matched": of["matched"],
+            "conflicts": of["conflicts"],
+        }
+
+    def say(self, said: dict[str, Any]) -> dict[str, Any]:
+        """Believe an operator: c1 becomes part of c0."""
+        made = _candidate("o-said")
+        made.update(kind="operator", state="accepted", reason="said by an operator")
+        made["T_a_b"] = said["T_a_b"]
+        self.constraints.append(made)
+        self.joined = True
+        self.version += 1
+        return made
 
     def what_if(self, identity: str, action: str) -> dict[str, Any]:
         """Answer who would move."""

@@ -9,12 +9,14 @@ import { SiteFeed } from "./net/site_feed.js";
 import { Token } from "./net/token.js";
 import { Selection } from "./selection.js";
 import { FrameControl } from "./tools/frame_control.js";
+import { Joiner } from "./tools/joiner.js";
 import { Localizer } from "./tools/localizer.js";
 import { MapControl } from "./tools/map_control.js";
 import { BlankPage } from "./ui/blank_page.js";
 import { byId } from "./ui/dom.js";
 import { Inspector } from "./ui/inspector.js";
 import { localizeCard } from "./ui/localize_card.js";
+import { joinCard } from "./ui/join_card.js";
 import { Notices } from "./ui/notices.js";
 import { SidePanel } from "./ui/side_panel.js";
 import { SitePicker } from "./ui/site_picker.js";
@@ -63,6 +65,8 @@ export class App {
     this.selection = new Selection(() => this._showSelection());
     this.tokenDialog = new TokenDialog((token, remember) => this._setToken(token, remember));
     this.theme = new Theme(this.preferences, (theme) => this._recolour(theme));
+    this.joiner = new Joiner(this, () => this._showJoining());
+    this.view.adjust = (placement) => this.joiner.place(placement);
     this.control = new MapControl(this);
     this.directory = new SiteDirectory(this.api, (sites) => this._takeSites(sites));
   }
@@ -86,6 +90,7 @@ export class App {
     document.title = `${site} – Lineloom`;
     this.history.clear();
     this.localizer.clear();
+    this.joiner.stop();
     this.frames.open();
     this.view.following = true;
     this.view.show(null);
@@ -98,10 +103,12 @@ export class App {
   /** Choose a thing, or nothing. @param {Thing|null} thing @param {boolean} [go] bring it into view */
   pick(thing, go = false) {
     this.localizer.clear();
+    if (thing) this.joiner.stop();
     this.selection.set(thing);
     if (thing && go) this.view.goTo(thing);
     if (thing && go) byId("side").classList.remove("open");
     this._showSelection();
+    if (thing) this.view.bringIntoView(thing);
   }
 
   /** Ask where a scan was taken. @param {File} file */
@@ -204,7 +211,7 @@ export class App {
     this.control.showTrail(thing, state);
     if (state) this.panel.show(state, this.view.palette, this.view.layers, thing);
     if (thing && state) void this.inspector.show(thing, this._cardContext(state));
-    else if (!this.localizer.answer) this.inspector.close();
+    else if (!this.localizer.answer && !this.joiner.active) this.inspector.close();
     this.view.draw();
   }
 
@@ -230,14 +237,37 @@ export class App {
       onGoTo: (thing) => this.view.goTo(thing),
       onAct: (id, action) => this._act(id, action),
       onWhatIf: (id) => this.api.post(`${this._path}/constraints/${encodeURIComponent(id)}/what-if`),
+      onJoin: (component) => this.control.toggleJoin(component),
       onDownload: (path, name) => this._download(path, name),
     };
   }
 
-  /** @param {string} id @param {"retract"|"restore"} action */
+  /** The card of the parts that are laid on each other. */
+  _showJoining() {
+    this.control.showJoining();
+    if (this.joiner.active) {
+      this.localizer.clear();
+      this.selection.set(null);
+      this.inspector.open(joinCard(this.joiner, () => this.joiner.stop(), () => void this._join()));
+    } else {
+      this.inspector.close();
+    }
+    this.view.relay();
+    if (this.joiner.trial) this.view.fit(); // clear of the card, which is larger now
+  }
+
+  async _join() {
+    const made = await this.joiner.confirm();
+    if (!made) return;
+    this.notices.say(`${made.id} is believed; the map follows`);
+    this.time.goLive();
+    this._feed?.refresh();
+  }
+
+  /** @param {string} id @param {"retract"|"restore"|"confirm"} action */
   async _act(id, action) {
     await this.api.post(`${this._path}/constraints/${encodeURIComponent(id)}/${action}`);
-    this.notices.say(`${id} is ${action === "retract" ? "retracted" : "restored"}; the map follows`);
+    this.notices.say(`${id} is ${{ retract: "retracted", restore: "restored", confirm: "believed" }[action]}; the map follows`);
     this.time.goLive();
     this._feed?.refresh();
   }

@@ -35,7 +35,7 @@ export function* paintConstraints(context, scene, view) {
 /** @param {any} context @param {import("./palette.js").Palette} palette @param {string} state @param {string} kind */
 function styleConstraint(context, palette, state, kind) {
   context.strokeStyle = palette.constraint(state);
-  context.lineWidth = kind === "rendezvous" ? 1.8 : 1.1;
+  context.lineWidth = kind !== "loop" ? 1.8 : 1.1;
   context.globalAlpha = state === "accepted" ? 0.8 : 0.7;
   context.setLineDash(DASHES[state] ?? []);
 }

@@ -17,6 +17,8 @@ import { Transition } from "./transition.js";
 const MOST_MOVING_LINES = 12000;
 /** Room around a thing that is gone to: it comes to lie in the middle, under the crosshair. */
 const AROUND = { top: 60, right: 60, bottom: 60, left: 60 };
+/** Nearer to an edge than this a thing is hardly seen. */
+const EDGE_PX = 24;
 
 /**
  * @typedef {import("../data/site_state.js").SiteState} SiteState
@@ -50,8 +52,12 @@ export class MapView {
     this.crosshair = false;
     /** What lies over the map's edges [px]. */
     this.insets = { top: 40, right: 40, bottom: 56, left: 40 };
+    /** How much of the map a sheet covers from below [px]. */
+    this.covered = () => 0;
     /** Tools that draw over the map. @type {Mark[]} */
     this.marks = [];
+    /** Tools that lay a component elsewhere. @type {(placement: Map<string, import("../geometry/pose.js").Pose>) => void} */
+    this.adjust = () => {};
     /** @type {() => void} called after every frame */
     this.onFrame = () => {};
     this._context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d", { alpha: false }));
@@ -81,6 +87,7 @@ export class MapView {
     this.state = state;
     if (state) this.frames = this.framesFor(state);
     this.placement = state ? arrange(state.components, this._aspect(), this.frames) : new Map();
+    this.adjust(this.placement);
     this._transition = null;
     if (state) {
       const moving = glide && before && before.site.site === state.site.site && !prefersStillness();
@@ -123,7 +130,7 @@ export class MapView {
     if (!this.state) return camera;
     const bounds = pageBounds(this.state.components, this.placement);
     // The frames of several components stand out a little.
-    camera.fit(bounds.grown(this.state.components.length > 1 ? 0.9 : 0), this.insets);
+    camera.fit(bounds.grown(this.state.components.length > 1 ? 0.9 : 0), this._clear(this.insets));
     return camera;
   }
 
@@ -132,8 +139,26 @@ export class MapView {
     const bounds = this._boundsOf(thing);
     if (bounds.isEmpty) return;
     this.following = false;
-    this.camera.fit(bounds.grown(3), AROUND);
+    this.camera.fit(bounds.grown(3), this._clear(AROUND));
     this.draw();
+  }
+
+  /** Move the map if a thing does not lie where it can be seen. @param {Thing} thing */
+  bringIntoView(thing) {
+    const bounds = this._boundsOf(thing);
+    if (bounds.isEmpty) return;
+    const { width, height } = this.camera;
+    const { x, y } = this.camera.toScreen(bounds.centre.x, bounds.centre.y);
+    const bottom = height - this.covered();
+    if (x > EDGE_PX && x < width - EDGE_PX && y > EDGE_PX && y < bottom - EDGE_PX) return;
+    this.following = false;
+    this.camera.pan(width / 2 - x, bottom / 2 - y);
+    this.draw();
+  }
+
+  /** Room at the edges, what a sheet covers included. @param {{top: number, right: number, bottom: number, left: number}} insets */
+  _clear(insets) {
+    return { ...insets, bottom: insets.bottom + this.covered() };
   }
 
   /** The map itself, layers or colours have changed. */
@@ -141,6 +166,15 @@ export class MapView {
     const scene = this.scene;
     if (scene) this._picture.show(scene);
     this.draw();
+  }
+
+  /** Components lie elsewhere, as a tool says. */
+  relay() {
+    if (!this.state) return;
+    this.placement = arrange(this.state.components, this._aspect(), this.frames);
+    this.adjust(this.placement);
+    this._picture.hurry();
+    this.repaint();
   }
 
   /** Draw a frame soon. */

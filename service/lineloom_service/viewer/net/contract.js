@@ -32,7 +32,7 @@
  * @typedef {{graph: {site: string, version: number, submaps?: Submap[]}, nodes: GraphNode[],
  *   edges: GraphEdge[]}} GraphAnswer
  *
- * @typedef {"sequential"|"loop"|"rendezvous"} ConstraintKind
+ * @typedef {"sequential"|"loop"|"rendezvous"|"operator"} ConstraintKind
  * @typedef {"candidate"|"accepted"|"rejected"|"retracted"} ConstraintState
  * @typedef {{at_least: number|null, at_most: number|null, holds: boolean, means?: string,
  *   unit?: string, log_odds?: number|null}} Limit
@@ -53,6 +53,11 @@
  *   components_after: ComponentRobots[], robots: {robot: string, moved_m: number|null,
  *   turned_rad: number|null, component_before: string|null,
  *   component_after: string|null}[]}} WhatIfAnswer
+ *
+ * @typedef {{constraint: string, component_a: string, component_b: string, T_a_b: Pose,
+ *   T_components: Pose|null, fits: boolean, reason: string, objections: string[],
+ *   checks: Object<string, number|null>, limits: Object<string, Limit>, matched: MatchedPair[],
+ *   conflicts: number[][]}} JoinTrialAnswer
  *
  * @typedef {Pose & {component: string, covariance: (number|null)[][]|null, score: number,
  *   checks: Object<string, number|null>, limits?: Object<string, Limit>}} HypothesisAnswer

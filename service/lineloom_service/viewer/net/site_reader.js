@@ -81,9 +81,9 @@ export class SiteReader {
     return answer;
   }
 
-  /** Return loops and rendezvous; tracked steps are drawn as trajectories. @returns {Promise<import("./contract.js").ConstraintAnswer[]>} */
+  /** Return loops, rendezvous and what operators said; tracked steps are drawn as trajectories. @returns {Promise<import("./contract.js").ConstraintAnswer[]>} */
   async _fetchConstraints() {
-    const kinds = await Promise.all(["loop", "rendezvous"].map((kind) => this._ofKind(kind)));
+    const kinds = await Promise.all(["loop", "rendezvous", "operator"].map((kind) => this._ofKind(kind)));
     return kinds.flat();
   }
 

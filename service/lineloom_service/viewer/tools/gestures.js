@@ -5,7 +5,8 @@ const CLICK_PX = 5;
  * @typedef {{onPan: (dx: number, dy: number) => void,
  *   onZoom: (factor: number, x: number, y: number) => void,
  *   onTap: (x: number, y: number) => void, onMove: (x: number, y: number) => void,
- *   onLeave: () => void}} Handlers
+ *   onLeave: () => void, onGrab: (x: number, y: number) => void, onRelease: () => void}} Handlers
+ * onGrab: a finger or button went down, before anything moves. onRelease: a drag has ended.
  */
 export class Gestures {
   /** @param {HTMLCanvasElement} canvas @param {Handlers} handlers */
@@ -34,7 +35,9 @@ export class Gestures {
     if (event.button !== 0) return;
     this._canvas.setPointerCapture(event.pointerId);
     if (this._pointers.size === 0) this._travelled = 0;
-    this._pointers.set(event.pointerId, this._at(event));
+    const at = this._at(event);
+    if (this._pointers.size === 0) this._handlers.onGrab(at.x, at.y);
+    this._pointers.set(event.pointerId, at);
   }
 
   /** @param {PointerEvent} event */
@@ -75,6 +78,8 @@ export class Gestures {
     this._pointers.delete(event.pointerId);
     if (at && this._pointers.size === 0 && this._travelled <= CLICK_PX) {
       this._handlers.onTap(at.x, at.y);
+    } else if (at && this._pointers.size === 0) {
+      this._handlers.onRelease();
     }
   }
 

@@ -23,6 +23,7 @@ export class MapControl {
     this._view = app.view;
     this._measure = new Measure();
     this._trailOf = "";
+    this._holding = false;
     this._reach = window.matchMedia("(pointer: coarse)").matches ? REACH_PX.touch : REACH_PX.mouse;
     const { canvas } = this._view;
     this._view.marks = [
@@ -36,6 +37,7 @@ export class MapControl {
       { name: "plus", icon: "plus", words: "Zoom in (+)", run: () => this._zoomMiddle(1.4) },
       { name: "minus", icon: "minus", words: "Zoom out (−)", run: () => this._zoomMiddle(1 / 1.4) },
       { name: "measure", icon: "ruler", words: "Measure a distance (M)", run: () => this._toggleMeasure(), toggles: true },
+      { name: "join", icon: "join", words: "Lay one part of the map on another (J)", run: () => this.toggleJoin(), toggles: true },
       { name: "localize", icon: "locate", words: "Localise a scan from a file (L)", run: () => byId("scan-file").click() },
     ]);
     new Gestures(canvas, {
@@ -44,11 +46,22 @@ export class MapControl {
       onTap: (x, y) => this._tap(this._view.camera.toWorld(x, y)),
       onMove: (x, y) => this._hover(this._view.camera.toWorld(x, y)),
       onLeave: () => this._leave(),
+      onGrab: (x, y) => this._grab(this._view.camera.toWorld(x, y)),
+      onRelease: () => this._release(),
     });
     this._listenToKeys(canvas);
     this._takeFiles();
     new ResizeObserver(() => this._clearToolbar()).observe(byId("tools"));
     this._clearToolbar();
+    this._view.covered = covered;
+    new ResizeObserver(() => this._clearSheet()).observe(byId("inspector"));
+  }
+
+  /** Keep what was chosen clear of the sheet that tells of it. */
+  _clearSheet() {
+    const { selected } = this._view;
+    if (selected) this._view.bringIntoView(selected);
+    else if (this._view.following) this._view.fit();
   }
 
   /** Keep the map clear of the toolbar: a column on the right, a row on top of phones. */
@@ -98,10 +111,25 @@ export class MapControl {
 
   /** @param {number} dx @param {number} dy */
   _pan(dx, dy) {
+    if (this._holding) {
+      this._app.joiner.move(dx / this._view.camera.scale, -dy / this._view.camera.scale);
+      return;
+    }
     this._view.following = false;
     this._view.camera.pan(dx, dy);
     this._keepView();
     this._view.draw();
+  }
+
+  /** Where maps are laid on each other, a drag takes one along. @param {{x: number, y: number}} point page [m] */
+  _grab(point) {
+    this._holding = this._app.joiner.active && this._app.joiner.grab(point);
+    if (this._holding) this._view.following = false;
+  }
+
+  _release() {
+    if (this._holding) void this._app.joiner.drop();
+    this._holding = false;
   }
 
   /** @param {number} factor @param {number} x @param {number} y */
@@ -133,6 +161,7 @@ export class MapControl {
       this._view.draw();
       return;
     }
+    if (this._app.joiner.active) return;
     this._app.pick(pick(scene, point, this._reach / camera.scale));
   }
 
@@ -169,7 +198,24 @@ export class MapControl {
     this._view.draw();
   }
 
+  /** Begin or end laying parts of the map on each other. @param {string} [component] the one to be moved */
+  toggleJoin(component = "") {
+    const { joiner } = this._app;
+    if (joiner.active && !component) joiner.stop();
+    else joiner.start(component);
+  }
+
+  /** Show whether parts of the map are being laid on each other. */
+  showJoining() {
+    this._toolbar.press("join", this._app.joiner.active);
+    this._view.canvas.classList.toggle("joining", this._app.joiner.active);
+  }
+
   _escape() {
+    if (this._app.joiner.active) {
+      this._app.joiner.stop();
+      return;
+    }
     if (this._measure.active) this._toggleMeasure();
     else this._app.pick(null);
   }
@@ -191,6 +237,7 @@ export class MapControl {
       fit: () => this.fit(),
       enter: () => this._enter(),
       measure: () => this._toggleMeasure(),
+      join: () => this.toggleJoin(),
       localize: () => byId("scan-file").click(),
       play: () => app.time.toggle(),
       escape: () => this._escape(),
@@ -234,6 +281,14 @@ export class MapControl {
   _afterFrame() {
     showScale(byId("scale-bar"), this._view.camera.scale);
   }
+}
+
+/** How much of the map the inspector covers from below, where it is a sheet [px]. */
+function covered() {
+  const sheet = byId("inspector");
+  if (sheet.hidden || getComputedStyle(sheet).position !== "fixed") return 0;
+  const map = byId("map").getBoundingClientRect();
+  return Math.max(0, map.bottom - sheet.getBoundingClientRect().top);
 }
 
 /**

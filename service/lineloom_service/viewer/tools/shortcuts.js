@@ -5,9 +5,10 @@ export const KEYS = [
   { keys: ["F"], words: "Show all and follow the map's growth" },
   { keys: ["Enter"], words: "Inspect what lies under the crosshair; while measuring, set a point" },
   { keys: ["M"], words: "Measure a distance" },
+  { keys: ["J"], words: "Lay one part of the map on another: the same place" },
   { keys: ["L"], words: "Localise a scan from a file" },
   { keys: ["Space"], words: "Play or pause the growth" },
-  { keys: ["Esc"], words: "Close details, end measuring" },
+  { keys: ["Esc"], words: "Close details, end measuring or joining" },
   { keys: ["T"], words: "Light or dark" },
   { keys: ["?"], words: "These keys" },
 ];
@@ -17,7 +18,7 @@ const ARROWS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowD
 
 /**
  * @typedef {{pan: (dx: number, dy: number) => void, zoom: (factor: number) => void,
- *   fit: () => void, enter: () => void, measure: () => void, localize: () => void,
+ *   fit: () => void, enter: () => void, measure: () => void, join: () => void, localize: () => void,
  *   play: () => void, escape: () => void, theme: () => void, help: () => void}} Actions
  */
 
@@ -50,6 +51,7 @@ function actionOf(key, actions) {
     "-": () => actions.zoom(1 / 1.3),
     f: actions.fit,
     m: actions.measure,
+    j: actions.join,
     l: actions.localize,
     t: actions.theme,
     "?": actions.help,

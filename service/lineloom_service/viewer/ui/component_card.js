@@ -1,3 +1,4 @@
+import { apart } from "./apart.js";
 import { h } from "./dom.js";
 import { card, facts, part, swatch } from "./card.js";
 import { count, metres } from "./format.js";
@@ -9,7 +10,8 @@ import { brief } from "../data/brief.js";
  * @param {import("../data/site_state.js").Component} component
  * @param {import("./inspector.js").CardContext} context
  */
-export function componentCard(component, { state, palette, onClose, onPick, onGoTo }) {
+export function componentCard(component, context) {
+  const { state, palette, onClose, onPick, onGoTo } = context;
   const lines = state.lines.answers.filter((line) => line.component === component.id);
   const wall = lines.reduce((sum, l) => sum + Math.hypot(l.x2 - l.x1, l.y2 - l.y1), 0);
   const absorbed = Object.keys(state.site.merged_into).filter((id) => state.survivorOf(id) === component.id);
@@ -25,17 +27,10 @@ export function componentCard(component, { state, palette, onClose, onPick, onGo
       ),
     ),
   );
-  const several = state.components.length > 1;
   return card(
     `Component ${brief(component.id)}`,
     null,
     onClose,
-    several &&
-      h(
-        "p",
-        { className: "reason" },
-        "How this part of the map lies to the others is not known yet. They are drawn side by side until the evidence is enough.",
-      ),
     facts([
       ["Id", component.id],
       ["Walls", `${count(lines.length)}, ${metres(wall)} in all`],
@@ -43,6 +38,7 @@ export function componentCard(component, { state, palette, onClose, onPick, onGo
       ["Extent", `${component.bounds.width.toFixed(1)} × ${component.bounds.height.toFixed(1)} m`],
       ["Has absorbed", absorbed.map(brief).join(", ") || null],
     ]),
+    apart(component, context),
     part("Robots", h("ul", { className: "rows" }, ...robots)),
     h(
       "div",

@@ -6,6 +6,8 @@ import { count, degrees, figure, metres, percent } from "./format.js";
 import { whatIfResult } from "./what_if_result.js";
 import { brief } from "../data/brief.js";
 
+const TITLES = { sequential: "Step", loop: "Loop", rendezvous: "Rendezvous", operator: "Operator's word" };
+
 /**
  * A constraint, its evidence, and what can be done about it.
  *
@@ -16,7 +18,7 @@ export function constraintCard(constraint, context) {
   const { T_a_b, checks, history } = constraint;
   const limits = constraint.limits ?? {};
   return card(
-    `${constraint.kind === "loop" ? "Loop" : "Rendezvous"} ${brief(constraint.id)}`,
+    `${TITLES[constraint.kind]} ${brief(constraint.id)}`,
     tag(constraint.state),
     context.onClose,
     h("p", { className: "reason", "data-state": constraint.state }, sentence(constraint.reason)),
@@ -75,6 +77,16 @@ function actions(constraint, context) {
           },
           // The service looks at the opposite of what is.
           `What if ${state === "retracted" ? "restored" : "retracted"}?`,
+        ),
+      (state === "candidate" || (state === "rejected" && !restoring)) &&
+        h(
+          "button",
+          {
+            className: "primary",
+            "data-key": "confirm",
+            onclick: (/** @type {Event} */ event) => run(event, () => context.onAct(constraint.id, "confirm")),
+          },
+          "Confirm",
         ),
       usable &&
         h(

@@ -49,7 +49,7 @@ export class ConstraintList {
       },
       h("span", { className: "mark", "data-state": state, "aria-hidden": "true" }),
       h("span", { className: "name" }, robots ?? brief(id), h("span", { className: "hidden-text" }, `, ${state}`)),
-      h("span", { className: "end" }, kind === "loop" ? "loop" : brief(id)),
+      h("span", { className: "end" }, kind === "rendezvous" ? brief(id) : kind),
     );
   }
 }
@@ -57,5 +57,5 @@ export class ConstraintList {
 /** Rendezvous before loops, the doubtful before the sure. @param {import("../net/contract.js").ConstraintAnswer} constraint */
 function rank({ kind, state }) {
   const doubt = ["candidate", "retracted", "accepted", "rejected"].indexOf(state);
-  return (kind === "rendezvous" ? 0 : 10) + doubt;
+  return (kind === "loop" ? 10 : 0) + doubt;
 }

@@ -10,8 +10,9 @@ import { robotCard } from "./robot_card.js";
  * @typedef {{state: import("../data/site_state.js").SiteState,
  *   palette: import("../draw/palette.js").Palette,
  *   onClose: () => void, onPick: (thing: Thing) => void, onGoTo: (thing: Thing) => void,
- *   onAct: (id: string, action: "retract"|"restore") => Promise<void>,
+ *   onAct: (id: string, action: "retract"|"restore"|"confirm") => Promise<void>,
  *   onWhatIf: (id: string) => Promise<import("../net/contract.js").WhatIfAnswer>,
+ *   onJoin: (component: string) => void,
  *   onDownload: (path: string, name: string) => void}} CardContext
  */
 
