@@ -39,6 +39,12 @@ Schema = list[tuple[str]]
 _columns_from = functools.cache(sqlite_upgrade._columns_from)
 
 
+def _from(revisions: tuple[str, ...]) -> pytest.MarkDecorator:
+    """Try each, and none. The oldest takes the steps of those between, whose tests are long."""
+    between = (pytest.param(revision, marks=pytest.mark.long) for revision in revisions[1:-1])
+    return pytest.mark.parametrize("revision", [None, revisions[0], *between, revisions[-1]])
+
+
 class Killed(BaseException):
     """Stands for the end of the process: nobody catches it."""
 
@@ -93,7 +99,7 @@ async def _starts(path: Path, before: Contents, schema: Schema) -> None:
         assert connection.execute("PRAGMA foreign_key_check").fetchall() == []
 
 
-@pytest.mark.parametrize("revision", [None, *OLDER])
+@_from(OLDER)
 async def test_a_kill_at_any_step_costs_another_start_and_one_copy(
     tmp_path: Path, revision: str | None
 ) -> None:
@@ -186,7 +192,7 @@ def _half_upgraded(directory: Path, revision: str | None) -> Iterator[Path]:
             return
 
 
-@pytest.mark.parametrize("revision", [None, *HALVED])
+@_from(HALVED)
 async def test_what_an_earlier_version_left_half_upgraded_is_completed(
     tmp_path: Path, revision: str | None
 ) -> None:

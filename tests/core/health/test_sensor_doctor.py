@@ -83,8 +83,15 @@ def only(doctor: SensorDoctor) -> Finding:
     return doctor.findings()[0]
 
 
-@pytest.mark.parametrize("lidar", [FULL_TURN, sick_lms200()], ids=["full turn", "half turn"])
-@pytest.mark.parametrize("odometry", [False, True])
+@pytest.mark.parametrize(
+    ("lidar", "odometry"),
+    [
+        pytest.param(FULL_TURN, False, id="full turn"),
+        pytest.param(sick_lms200(), True, id="half turn and wheels"),
+        pytest.param(FULL_TURN, True, id="full turn and wheels", marks=pytest.mark.long),
+        pytest.param(sick_lms200(), False, id="half turn", marks=pytest.mark.long),
+    ],
+)
 def test_a_sound_sensor_is_left_in_peace(lidar: Lidar, odometry: bool) -> None:
     doctor = examined(drive(lidar=lidar, odometry=odometry))
     assert doctor.findings() == ()
@@ -158,7 +165,9 @@ def test_millimetres_beyond_a_range_max_in_metres_look_like_nothing_at_all() -> 
     assert "millimetres" in found.message
 
 
-@pytest.mark.parametrize("share", [0.9, 0.95, 1.05, 1.1])
+@pytest.mark.parametrize(
+    "share", [0.95, 1.05, *(pytest.param(share, marks=pytest.mark.long) for share in (0.9, 1.1))]
+)
 def test_a_wrong_increment_bends_walls(share: float) -> None:
     """A lidar of half a turn: a full one could not claim more."""
     scans = [with_increment(share)(scan) for scan in drive(lidar=sick_lms200())]
