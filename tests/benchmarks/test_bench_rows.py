@@ -10,6 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.benchmarks.capacity import HEAD as CAPACITY_HEAD
+from tests.benchmarks.capacity import Looks, Trial, percentile
+from tests.benchmarks.paced_fleet import PacedFleet
 from tests.benchmarks.row import Row, median_seconds, table
 from tests.benchmarks.site_sizes import HEAD, SiteSize
 
@@ -66,3 +69,23 @@ def test_the_benchmark_runs_without_data_and_prints_json(tmp_path: Path) -> None
         *("features", "graph", "map", "pair", "place", "scan"),
     }
     assert all(row["ratio"] > 0.0 for row in rows)
+
+
+def test_a_backlog_that_grows_by_more_than_a_second_s_scans_is_not_kept_up_with() -> None:
+    looks = Looks(pending=[0, 0, 10, 10, 30, 30, 50, 50, 60, 60], delays=[0.5] * 50 + [2.0] * 50)
+    trial = Trial(10, 1, 100.0, 0, looks, 10**9)
+    assert looks.fifth(1) == 10.0
+    assert looks.fifth(4) == 60.0
+    assert trial.keeps_up
+    assert not replace(trial, scans_per_s=49.0).keeps_up
+    assert not replace(trial, refused=1).keeps_up
+    assert len(trial.row().split("|")) == len(CAPACITY_HEAD.splitlines()[0].split("|"))
+    assert percentile(looks.delays, 99) == 2.0
+
+
+def test_a_scan_waits_from_when_it_was_sent_until_it_is_in_the_map() -> None:
+    fleet = PacedFleet(0, {}, sent={("s", "r"): [(4, 10.0), (9, 10.5)], ("s", "q"): []})
+    assert fleet.age_s("s", "r", None, 11.0) == 1.0
+    assert fleet.age_s("s", "r", 4, 11.0) == 0.5
+    assert fleet.age_s("s", "r", 9, 11.0) == 0.0
+    assert fleet.age_s("s", "q", None, 11.0) is None
