@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from weakref import ref
 
 import numpy as np
-from lineloom_core.lately import UsedLately
+from lineloom_core.lately import KeptWithin, UsedLately
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,3 +62,28 @@ def test_two_of_them_do_not_meddle() -> None:
     things = [Thing(k) for k in range(4)]
     for _ in range(2):
         assert [(double(t), triple(t)) for t in things] == [(0, 0), (2, 3), (4, 6), (6, 9)]
+
+
+def test_what_there_is_room_for_is_kept_and_the_rest_made_anew() -> None:
+    made: list[int] = []
+
+    def squared(thing: Thing) -> int:
+        made.append(thing.number)
+        return thing.number**2
+
+    square = KeptWithin[Thing, int](squared, lambda _: 10, 35)
+    things = [Thing(k) for k in range(5)]
+    for _ in range(2):
+        assert [square(thing) for thing in things] == [0, 1, 4, 9, 16]
+    assert made == [0, 1, 2, 3, 4, 3, 4]
+    assert len(square) == 3
+
+
+def test_what_goes_makes_room() -> None:
+    kept = KeptWithin[Thing, Made](lambda _: Made(), lambda _: 10, 20)
+    things = [Thing(k) for k in range(3)]
+    made = [ref(kept(thing)) for thing in things]
+    del things[0]
+    gc.collect()
+    assert [m() is not None for m in made] == [False, True, False]
+    assert kept(things[1]) is kept(things[1])

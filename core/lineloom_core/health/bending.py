@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from lineloom_core.codec import storable
 from lineloom_core.features import ScanFeatures
 from lineloom_core.features._circle_kernels import ARC, RADIUS, SENSE
-from lineloom_core.features._kernels import FIRST, LAST, LENGTH, OFFSET, THETA
+from lineloom_core.health import _kernels as kernels
 from lineloom_core.health.finding import Finding
 from lineloom_core.health.sample import Sample
 
@@ -141,39 +141,11 @@ def bend_of(features: ScanFeatures) -> tuple[float, float] | None:
     The variance of epsilon is that of the points across the walls over the leverage. None where no
     wall is seen long and wide enough to tell.
     """
-    above = below = 0.0
-    for line in features.lines[features.lines[:, LENGTH] >= _LEAST_LENGTH_M]:
-        shape = _bulge(features, line)
-        if shape is not None:
-            above += shape[0]
-            below += shape[1]
+    above, below = kernels.bulges(
+        features.points, features.beams, features.lines,
+        _LEAST_LENGTH_M, _LEAST_POINTS, _LEAST_DISTANCE_M, _STEEPEST_RAD,
+    )  # fmt: skip
     return (above / below, below) if below >= _LEAST_LEVERAGE_M2 else None
-
-
-def _bulge(features: ScanFeatures, line: NDArray[np.float64]) -> tuple[float, float] | None:
-    """One wall's share in the least-squares fit of epsilon: numerator and denominator [m^2]."""
-    a, b = np.searchsorted(features.beams, [line[FIRST], line[LAST] + 1])
-    distance = -line[OFFSET]
-    if b - a < _LEAST_POINTS or distance < _LEAST_DISTANCE_M:
-        return None
-    c, s = math.cos(line[THETA]), math.sin(line[THETA])
-    points = features.points[a:b]
-    along = c * points[:, 0] + s * points[:, 1]
-    towards = c * points[:, 1] - s * points[:, 0] + distance
-    bearing = np.arctan2(along, distance)
-    flat = np.abs(bearing) < _STEEPEST_RAD
-    if np.count_nonzero(flat) < _LEAST_POINTS:
-        return None
-    along, towards, bearing = along[flat], towards[flat], bearing[flat]
-    shape, measured = _detrended(bearing * along, along), _detrended(towards, along)
-    return float(shape @ measured), float(shape @ shape)
-
-
-def _detrended(values: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What is left of values when a straight line over `along` is taken out."""
-    centred, at = values - values.mean(), along - along.mean()
-    left: NDArray[np.float64] = centred - (centred @ at) / (at @ at) * at
-    return left
 
 
 def _wrong_increment(epsilon: float, increment: float) -> Finding:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from lineloom_core.codec import storable
 from lineloom_core.geometry import Pose
+from lineloom_core.health import _kernels as kernels
 from lineloom_core.health.finding import Finding, Severity
 from lineloom_core.health.sample import Sample
 from lineloom_core.scan import Scan
@@ -40,8 +41,6 @@ _SURE_BACK = 6
 
 _STALE = 40
 """Scans after which a source that did not go on is none."""
-
-_TURNED = (np.arange(_SECTORS) - np.arange(-_SHIFTS, _SHIFTS + 1)[:, None]) % _SECTORS
 
 
 @storable("scan-source")
@@ -134,12 +133,10 @@ def _jumps(now: Pose | None, last: Pose | None, other: Pose | None) -> bool:
 
 def _profile(scan: Scan) -> NDArray[np.float64]:
     """Return the mean range in each sector around the lidar [m]."""
-    angles = scan.angle_min + scan.angle_increment * np.arange(len(scan.ranges))
-    seen = np.isfinite(scan.ranges)
-    sector = np.floor(np.mod(angles[seen] / math.tau, 1.0) * _SECTORS).astype(np.int64) % _SECTORS
-    count = np.bincount(sector, minlength=_SECTORS)
-    total = np.bincount(sector, scan.ranges[seen], minlength=_SECTORS)
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    found: NDArray[np.float64] = kernels.profile(
+        scan.ranges, scan.angle_min, scan.angle_increment, _SECTORS
+    )
+    return found
 
 
 def _apart(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
@@ -147,7 +144,4 @@ def _apart(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
 
     Where both see something: of a scan that lost some of its beams the rest is what it was.
     """
-    difference = np.minimum(np.abs(a - b[_TURNED]), _FAR_M)
-    both = np.count_nonzero(np.isfinite(difference), axis=1)
-    mean = np.nansum(difference, axis=1) / np.maximum(both, 1)
-    return float(np.min(np.where(both >= _LEAST_COMMON, mean, _FAR_M)))
+    return float(kernels.profiles_apart(a, b, _SHIFTS, _FAR_M, _LEAST_COMMON))

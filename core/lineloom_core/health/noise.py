@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from lineloom_core.codec import storable
+from lineloom_core.health import _kernels as kernels
 from lineloom_core.health.finding import Finding
 from lineloom_core.health.sample import Sample
 
@@ -36,16 +35,10 @@ class NoiseCheck:
     def examine(self, sample: Sample) -> None:
         """Look at the next scan."""
         ranges = sample.scan.ranges
-        apart = len(ranges) // 3
-        with np.errstate(invalid="ignore"):
-            near, far = np.abs(np.diff(ranges)), np.abs(ranges[apart:] - ranges[: -apart or None])
-        near, far = near[np.isfinite(near)], far[np.isfinite(far)]
-        if len(near) < _LEAST_PAIRS or len(far) < _LEAST_PAIRS:
-            return
-        strangers = float(np.median(far))
-        self.random.append(
-            strangers > _LEAST_SPREAD_M and float(np.median(near)) > _ALIKE * strangers
-        )
+        near, pairs = kernels.median_step(ranges, 1)
+        far, strangers = kernels.median_step(ranges, len(ranges) // 3)
+        if min(pairs, strangers) >= _LEAST_PAIRS:
+            self.random.append(far > _LEAST_SPREAD_M and near > _ALIKE * far)
 
     def findings(self) -> list[Finding]:
         """What is wrong now."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lineloom_core.codec import storable
+from lineloom_core.health import _kernels as kernels
 from lineloom_core.health.finding import Finding
 from lineloom_core.health.sample import Sample
 
@@ -33,14 +34,16 @@ class UnitsCheck:
     def examine(self, sample: Sample) -> None:
         """Look at the next scan."""
         ranges = sample.scan.ranges
-        seen = ranges[np.isfinite(ranges)]
-        if len(seen) < _BLIND_SHARE * len(ranges) or len(seen) == 0:
+        median, seen = kernels.median_step(ranges, 0)
+        if seen < _BLIND_SHARE * len(ranges) or seen == 0:
             self.blind, self.huge, self.tiny = self.blind + 1, 0, 0
             return
         self.blind = 0
-        self.median_m = float(np.median(seen))
+        self.median_m = median
         self.huge = self.huge + 1 if self.median_m > _FAR_M else 0
-        covered = len(seen) > 0.8 * len(ranges) and float(seen.max()) < _NEAR_M
+        covered = seen > 0.8 * len(ranges) and median < _NEAR_M
+        if covered:
+            covered = bool(ranges[np.isfinite(ranges)].max() < _NEAR_M)
         self.tiny = self.tiny + 1 if covered else 0
 
     def findings(self) -> list[Finding]:

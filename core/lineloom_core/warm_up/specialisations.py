@@ -30,7 +30,7 @@ class Specialisation:
 
     @property
     def task(self) -> str:
-        """What it is part of: features, matching, places or fusion."""
+        """What it is part of: features, health, matching, places or fusion."""
         return self.kernel.partition(".")[0]
 
     def compile(self) -> None:
@@ -131,6 +131,10 @@ MAPPING = _parsed(f"""
     matching._hypothesis.evidence                | F1
     matching._hypothesis.translation_information | f f f f f f
     places._kernels.place_evidence               | f f f
+    health._kernels.bulges                       | F2 I1 F2 f i f f
+    health._kernels.profile                      | F1r f f i
+    health._kernels.profiles_apart               | F1 F1 i f i
+    health._kernels.median_step                  | F1r i
 """)
 """What scans are mapped with: the largest first, those last that are made of others."""
 

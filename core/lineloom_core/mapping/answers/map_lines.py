@@ -15,6 +15,7 @@ from lineloom_core.fusion.persistence import lasting_stretches
 from lineloom_core.fusion.stretches import Stretches
 from lineloom_core.fusion.walls import Surfaces, find_walls
 from lineloom_core.mapping.answers.ray_source import rays_of
+from lineloom_core.mapping.answers.seen_surfaces import Seen, seen_by
 from lineloom_core.mapping.answers.site_view import MapLine
 from lineloom_core.mapping.belief.site_map import SiteMap
 from lineloom_core.mapping.facts.keyframe import Keyframe
@@ -38,10 +39,11 @@ def _component_lines(site: SiteMap, component: str, keyframes: list[int]) -> Ite
     """The walls that last, with their corners closed; those that one keyframe saw as they are."""
     frames = [site.keyframes[k] for k in keyframes]
     poses = np.array([site.pose(k).to_array() for k in keyframes]).reshape(-1, 3)
-    observations = _observations(frames, poses)
+    seen = [seen_by(frame) for frame in frames]
+    observations = _observations(frames, seen, poses)
     if len(observations) == 0:
         return
-    walls = find_walls(observations, _surfaces(frames, poses), site.config.fusion)
+    walls = find_walls(observations, _surfaces(seen, poses), site.config.fusion)
     rays, config = rays_of(site, keyframes), site.config.persistence
     lasting = lasting_stretches(walls.endpoints, rays, config)
     if not lasting:
@@ -52,11 +54,11 @@ def _component_lines(site: SiteMap, component: str, keyframes: list[int]) -> Ite
     met = np.zeros((len(of), 2), dtype=np.bool_)
     ends[~once], met[~once] = close_corners(ends[~once], rays, config)
     layers, names = layers_of(ends, walls.wall[of], once, met), _names(walls, of)
-    for k, seen in enumerate(walls.seen_by(of, begin, end)):
-        if len(seen) < site.config.fusion.min_support:
+    stamps = np.array([f.scan.stamp for f in frames])
+    robots, robot = np.unique([f.robot for f in frames], return_inverse=True)
+    for k, saw in enumerate(walls.seen_by(of, begin, end)):
+        if len(saw) < site.config.fusion.min_support:
             continue
-        saw = [frames[f] for f in seen.tolist()]
-        stamps = [f.scan.stamp for f in saw]
         x1, y1, x2, y2 = ends[k].tolist()
         yield MapLine(
             id=names[k],
@@ -67,9 +69,9 @@ def _component_lines(site: SiteMap, component: str, keyframes: list[int]) -> Ite
             y2=y2,
             sigma=float(walls.sigma[of[k]]),
             support=len(saw),
-            robots=tuple(sorted({f.robot for f in saw})),
-            first_seen=min(stamps),
-            last_seen=max(stamps),
+            robots=tuple(robots[np.unique(robot[saw])].tolist()),
+            first_seen=float(stamps[saw].min()),
+            last_seen=float(stamps[saw].max()),
             layer=layers[k],
             wall=f"w{walls.wall_id[of[k]]}",
         )
@@ -96,21 +98,21 @@ def _cut(
     return np.hstack([start + begin[:, None] * along, start + end[:, None] * along])
 
 
-def _surfaces(frames: Sequence[Keyframe], poses: NDArray[np.float64]) -> Surfaces:
-    clouds = [f.cloud for f in frames]
+def _surfaces(seen: Sequence[Seen], poses: NDArray[np.float64]) -> Surfaces:
     return Surfaces(
         poses=poses,
-        begins=np.cumsum([0, *(len(c.points) for c in clouds)]),
-        points=np.concatenate([c.points for c in clouds]),
-        normals=np.concatenate([c.normals for c in clouds]),
-        beams=np.concatenate([f.features.beams for f in frames]),
+        begins=np.cumsum([0, *(len(s.points) for s in seen)]),
+        points=np.concatenate([s.points for s in seen]),
+        normals=np.concatenate([s.normals for s in seen]),
+        beams=np.concatenate([s.beams for s in seen], dtype=np.int64),
     )
 
 
-def _observations(frames: Sequence[Keyframe], poses: NDArray[np.float64]) -> LineObservations:
+def _observations(
+    frames: Sequence[Keyframe], seen: Sequence[Seen], poses: NDArray[np.float64]
+) -> LineObservations:
     """All keyframes' lines in the component's frame."""
-    seen = [f.features.lines for f in frames]
-    lines, counts = np.concatenate(seen), [len(s) for s in seen]
+    lines, counts = np.concatenate([s.lines for s in seen]), [len(s.lines) for s in seen]
     of = np.repeat(np.arange(len(frames)), counts)
     keyframe = np.array([f.id for f in frames], dtype=np.int64)[of]
     c, s = np.cos(poses[of, 2, None]), np.sin(poses[of, 2, None])

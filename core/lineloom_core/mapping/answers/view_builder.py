@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,10 +29,10 @@ def build_view(
 ) -> SiteView:
     """Compose the view of a version; changes nothing. settled: whether the site's poses are."""
     component_of = {k: site.component_id(k) for k in site.keyframes}
-    drifts = _drifts(site, robots)
+    drifts, kept = _drifts(site, robots), Counter(k.robot for k in site.keyframes.values())
     return SiteView(
         version=version,
-        robots={n: _robot(site, r, component_of, drifts) for n, r in robots.items()},
+        robots={n: _robot(site, r, kept[n], component_of, drifts) for n, r in robots.items()},
         components=_components(site, component_of),
         merged_into=dict(site.merged_into),
         trajectories=_trajectories(site, robots, component_of),
@@ -59,6 +61,7 @@ def _components(site: SiteMap, component_of: dict[int, str]) -> tuple[ComponentV
 def _robot(
     site: SiteMap,
     record: RobotRecord,
+    kept: int,
     component_of: dict[int, str],
     drifts: dict[int, Drifts],
 ) -> RobotView:
@@ -77,7 +80,7 @@ def _robot(
         covariance=covariance,
         state=record.state,
         scans_processed=record.processed,
-        keyframes=sum(1 for k in site.keyframes.values() if k.robot == record.name),
+        keyframes=kept,
         latest_stamp=record.stamp,
         latest_session=record.session,
         latest_seq=record.seq,

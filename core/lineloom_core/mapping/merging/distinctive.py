@@ -30,12 +30,16 @@ def _looks_like(site: SiteMap, place: Place, other: Place, need: float) -> bool:
     """Whether there is more evidence than `need` for another relative pose than the known one."""
     first, second = (other, place) if other.id < place.id else (place, other)
     known = site.pose(first.anchor).between(site.pose(second.anchor))
-    table = site.memory.look_alikes(first, second)
-    sigmas = site.config.wide_loops.most_sigmas
-    for drift in (site.rough_drift, site.drift):  # the second takes long and is seldom asked
+    config, sigmas = site.config.recognition, site.config.wide_loops.most_sigmas
+    memory = site.memory
+    # From what is had soonest to what takes long and is seldom asked.
+    for tables, drift in (
+        (memory.hypotheses, site.rough_drift),
+        (memory.look_alikes, site.rough_drift),
+        (memory.look_alikes, site.drift),
+    ):
         apart = first is not second
         slack = reach(drift(first.anchor, second.anchor), sigmas) if apart else 0.0
-        evidence = evidence_elsewhere(table, known, site.config.recognition, slack=slack)
-        if evidence <= need:
+        if evidence_elsewhere(tables(first, second), known, config, slack=slack) <= need:
             return False
     return True

@@ -33,7 +33,8 @@ def close_wide_loops(site: SiteMap, place: Place) -> bool:
     candidates = refuse_barred(site, candidates)
     drifts = site.drifts(k for c in candidates for k in (c.keyframe_a, c.keyframe_b))
     # All are judged by the graph as it was: accepting one changes what the drift allows the next.
-    judged = [_judged(site, c, candidates, drifts) for c in candidates]
+    corrections = {c.id: _in_the_map(site, c) for c in candidates}
+    judged = [_judged(site, c, candidates, corrections, drifts) for c in candidates]
     believed = [c for c in judged if c.consistency_set]
     for c in believed:
         site.add_constraint(c)
@@ -44,7 +45,11 @@ def close_wide_loops(site: SiteMap, place: Place) -> bool:
 
 
 def _judged(
-    site: SiteMap, c: Constraint, candidates: list[Constraint], drifts: Drifts
+    site: SiteMap,
+    c: Constraint,
+    candidates: list[Constraint],
+    corrections: dict[str, Pose],
+    drifts: Drifts,
 ) -> Constraint:
     """The candidate with its figures, accepted where nothing speaks against it."""
     config, off = site.config.wide_loops, _correction(site, c)
@@ -52,7 +57,7 @@ def _judged(
     agreeing: list[str] = []
     if not WIDE_LOOP.against(config, figures):
         others = (o for o in candidates if o.id != c.id)
-        agreeing = [o.id for o in others if _loops_agree(site, c, o, drifts)]
+        agreeing = [o.id for o in others if _loops_agree(site, c, o, corrections, drifts)]
         figures["agreeing"] = float(len(agreeing))
     c = c.with_figures(figures)
     objection = WIDE_LOOP.objection(config, figures)
@@ -78,22 +83,30 @@ def _sigmas(c: Constraint, off: Pose, drifts: Drifts) -> float:
     return math.sqrt(float(error @ np.linalg.solve(covariance, error)))
 
 
-def _loops_agree(site: SiteMap, c: Constraint, o: Constraint, drifts: Drifts) -> bool:
+def _loops_agree(
+    site: SiteMap, c: Constraint, o: Constraint, corrections: dict[str, Pose], drifts: Drifts
+) -> bool:
     """Two loops agree when they correct the graph alike, give or take the drift in between."""
     if {c.place_a, c.place_b} & {o.place_a, o.place_b} == {c.place_a, c.place_b}:
         return False
-    config = site.config.wide_loops
-    T_c, T_o = (
-        site.pose(k.keyframe_a) @ k.T_a_b @ site.pose(k.keyframe_b).inverse() for k in (c, o)
-    )
-    at = site.pose(c.keyframe_b)
-    off = (T_c @ at).between(T_o @ at)
+    config, at = site.config.wide_loops, site.pose(c.keyframe_b)
+    off = (corrections[c.id] @ at).between(corrections[o.id] @ at)
+    if abs(angle_difference(off.theta, 0.0)) >= config.turn:
+        return False
+    apart = math.hypot(off.x, off.y)
+    if apart < config.slack:
+        return True
     slack = (
         config.slack
         + reach(drifts(c.keyframe_a, o.keyframe_a), config.most_sigmas)
         + reach(drifts(c.keyframe_b, o.keyframe_b), config.most_sigmas)
     )
-    return math.hypot(off.x, off.y) < slack and abs(angle_difference(off.theta, 0.0)) < config.turn
+    return apart < slack
+
+
+def _in_the_map(site: SiteMap, c: Constraint) -> Pose:
+    """The correction as what it moves in the map's frame at the newer end."""
+    return site.pose(c.keyframe_a) @ c.T_a_b @ site.pose(c.keyframe_b).inverse()
 
 
 def _drop_contradicted(site: SiteMap, candidates: list[Constraint], root: int) -> None:
