@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from lineloom_service.engine.hosted_site import Remaking
 from lineloom_service.engine.published import Published
 from lineloom_service.observation.arrivals import Heard
+from lineloom_service.observation.loads import Load
 from lineloom_service.relative_pose import RelativePose
 from lineloom_service.store.codec import decode_mount
 from lineloom_service.store.records import SCANS, RobotRecord, SiteRecord, Skip
@@ -62,7 +63,8 @@ def to_site(
     record: SiteRecord,
     published: Published,
     trouble: str | None,
-    remaking: wire.Remaking | None = None,
+    remaking: wire.Remaking | None,
+    load: Load,
 ) -> wire.Site:
     """Return how a site is doing. trouble: why it is not mapped just now."""
     view = published.view
@@ -85,6 +87,8 @@ def to_site(
         constraints=constraints,
         trouble=trouble,
         remaking=remaking,
+        overloaded=load.is_over,
+        suggested_rate_hz=load.rate_hz,
     )
 
 

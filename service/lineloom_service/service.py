@@ -22,6 +22,7 @@ from lineloom_service.matching import PairMatcher
 from lineloom_service.observation.arrivals import Arrivals
 from lineloom_service.observation.conflicts import Conflicts
 from lineloom_service.observation.latency import Latency
+from lineloom_service.observation.loads import Loads
 from lineloom_service.observation.metrics import Metrics, SiteFigures
 from lineloom_service.observation.storage_watch import StorageWatch
 from lineloom_service.pacing import Pacer
@@ -80,6 +81,7 @@ class Service:
         self.conflicts = Conflicts()
         self._latency = Latency()
         self.arrivals = Arrivals(settings.silent_after_s)
+        self.loads = Loads(self.conductor.processed)
         self._sites_seen: list[SiteRecord] = []
         self.metrics.watch(
             self.site_figures, self.engine.durations, self._latency.histogram, self.readiness
@@ -103,6 +105,7 @@ class Service:
             self.arrivals.begin(record)
         self.store.subscribe(self._latency.on_commit)
         self.store.subscribe(self.arrivals.on_commit)
+        self.store.subscribe(self.loads.on_commit)
         self.conductor.subscribe(self._latency.on_view)
         self.conductor.subscribe(self._on_view)
         await self.conductor.start()

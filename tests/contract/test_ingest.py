@@ -34,7 +34,8 @@ async def test_one_scan_is_taken_and_mapped(
 ) -> None:
     response = await post_scans(client, site, make_scan(0))
     assert response.status_code == 202
-    assert response.json() == {"accepted": 1, "duplicates": 0, "rejected": [], "pending": 1}
+    counts = {"accepted": 1, "duplicates": 0, "rejected": [], "pending": 1}
+    assert response.json() == {**counts, "suggested_rate_hz": None}
     answer = await idle(site)
     assert answer["scans"] == {"accepted": 1, "processed": 1, "pending": 0, "skipped": 0}
     assert answer["robots"] == ["r"]

@@ -119,12 +119,13 @@ class BatchTotal:
             duplicates=total.duplicates + answer.duplicates,
             rejected=[*total.rejected, *moved],
             pending=answer.pending,
+            suggested_rate_hz=answer.suggested_rate_hz,
         )
         self._sent += sent
 
     @property
     def answer(self) -> IngestAnswer:
-        """The sum; `pending` is the latest one."""
+        """The sum; `pending` and `suggested_rate_hz` are the latest ones."""
         return self._answer
 
 

@@ -52,6 +52,7 @@ async def post_scans(
             duplicates=appended.duplicates,
             rejected=sorted(rejected, key=lambda refused: refused.index),
             pending=max(0, appended.position - published.position) + appended.held,
+            suggested_rate_hz=None if known is None else service.loads.of(known).rate_hz,
         ),
         status=202,
     )

@@ -29,7 +29,8 @@ async def get_site(site: KnownSite, service: ServiceDep) -> Response:
     """Return how a site is doing. `idle`: all that was accepted is in the map.
 
     `trouble`: what is wrong just now, such as a log that cannot be read, a worker that hangs or a
-    disk that is full; else null.
+    disk that is full; else null. `overloaded`: scans come faster than they are mapped, and wait for
+    more than five seconds; `suggested_rate_hz` is what each robot may send then.
     """
     return answer(await _site(site, service))
 
@@ -51,4 +52,5 @@ async def _site(record: SiteRecord, service: Service) -> wire.Site:
         conductor.published(record.id),
         service.trouble(record.id),
         to_remaking(await conductor.remaking_anywhere(record)),
+        service.loads.of(record),
     )

@@ -222,7 +222,8 @@ def test_places_that_look_like_others_nearby_prove_nothing(
     elsewhere = np.zeros((1, 10))  # as if each were found elsewhere, with as much evidence
     elsewhere[0, :3] = 100.0, 100.0, 2.0
     elsewhere[0, 9] = STRONG
-    monkeypatch.setattr(meeting.site.memory, "look_alikes", lambda a, b: elsewhere)
+    for tables in ("hypotheses", "look_alikes"):
+        monkeypatch.setattr(meeting.site.memory, tables, lambda a, b: elsewhere)
     assert meeting.join() is None
     assert said(meeting) == {"the places look like others of the same robots"}
 

@@ -33,10 +33,13 @@ class IngestAnswer(Answer):
 
     duplicates: scans that were there before (same session, seq and content); sending again is
     harmless. Without seq those are meant that were there with the same content.
-    pending: scans of the site accepted and not yet in the map.
+    pending: scans of the site accepted and not yet in the map. suggested_rate_hz: scans a second
+    that the robot may send while the site is overloaded, None where it is not. Leave scans out at
+    equal intervals: one in three still makes a map.
     """
 
     accepted: int
     duplicates: int
     rejected: list[RejectedScan]
     pending: int
+    suggested_rate_hz: float | None = None

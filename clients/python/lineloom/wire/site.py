@@ -44,6 +44,8 @@ class Site(Answer):
     merged_into: id of an absorbed component -> id of its survivor.
     trouble: why it is not mapped just now, None where all is well.
     remaking: how far the map is that will be shown instead of this one, None where none is made.
+    overloaded: scans come faster than they are mapped. suggested_rate_hz: what each robot that
+    sends may send then, None where all is well.
     """
 
     site: str
@@ -57,6 +59,8 @@ class Site(Answer):
     constraints: dict[str, dict[str, int]]
     trouble: str | None = None
     remaking: Remaking | None = None
+    overloaded: bool = False
+    suggested_rate_hz: float | None = None
 
 
 class SiteList(Answer):
