@@ -269,6 +269,22 @@ def test_localizing_sends_a_run_and_reads_the_hypotheses(run: Run, fake: FakeSer
     assert (result.verdict, result.scan, result.hypotheses[0].x) == ("unique", 1, 1.5)
 
 
+def test_localizing_takes_one_scan_as_well(run: Run, fake: FakeService) -> None:
+    found: dict[str, Any] = {"site": "7", "verdict": "unknown", "reason": "no", "scan": None}
+    found["hypotheses"] = []
+    fake.routes["POST", "/v1/sites/7/localize"] = lambda _: httpx.Response(200, json=found)
+    assert run("localize", (7, scan(3)), {}).verdict == "unknown"
+    assert [s["seq"] for s in read_body(fake.requests[-1])["scans"]] == [3]
+
+
+def test_sites_and_robots_are_deleted(run: Run, fake: FakeService) -> None:
+    for path in ("/v1/sites/s", "/v1/sites/s/robots/3"):
+        fake.routes["DELETE", path] = lambda _: httpx.Response(204)
+    run("delete_robot", ("s", 3), {})
+    run("delete_site", ("s",), {})
+    assert [request.method for request in fake.requests] == ["DELETE", "DELETE"]
+
+
 def test_the_mount_is_put(run: Run, fake: FakeService) -> None:
     def answer(request: httpx.Request) -> httpx.Response:
         assert json.loads(request.content)["mount"]["theta"] == 0.5

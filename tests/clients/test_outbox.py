@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import signal
 import subprocess
@@ -14,6 +15,8 @@ import httpx
 import pytest
 from lineloom import (
     AccessDeniedError,
+    AsyncClient,
+    AsyncOutbox,
     Client,
     NotIdleError,
     Outbox,
@@ -328,3 +331,19 @@ def test_kill_9_without_a_network_loses_nothing(
     assert outbox.stats().pending >= len(known) > 0
     outbox.flush(20.0)
     assert set(known) <= set(fake.delivered())
+
+
+def test_the_asynchronous_outbox_delivers_what_is_put(
+    tmp_path: Path, loopback: str, fake: FakeService
+) -> None:
+    async def go() -> None:
+        async with AsyncClient(loopback) as client:
+            outbox = AsyncOutbox(tmp_path / "scans.db", client, "s", "r", session="one")
+            async with outbox:
+                assert [await outbox.put(scan(None)) for _ in range(3)] == [0, 1, 2]
+                assert (await outbox.flush()).pending == 0
+                assert await outbox.refusals() == []
+                assert outbox.failure is None
+
+    asyncio.run(go())
+    assert fake.delivered() == [("one", 0), ("one", 1), ("one", 2)]

@@ -30,12 +30,13 @@ from lineloom.errors import (
     TooSlowError,
     UnexpectedAnswerError,
 )
-from lineloom.outbox import Outbox, OutboxStats
+from lineloom.outbox import AsyncOutbox, Outbox, OutboxStats
 from lineloom.retry import RetryPolicy
 
 __all__ = [
     "AccessDeniedError",
     "AsyncClient",
+    "AsyncOutbox",
     "BusyError",
     "Client",
     "ConflictError",

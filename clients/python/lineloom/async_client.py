@@ -5,45 +5,25 @@ from __future__ import annotations
 import asyncio
 import itertools
 import time
-from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
-from typing import Any, Literal, Self, TypeVar
+from collections.abc import AsyncIterator, Callable, Iterable, Sequence
+from typing import TypeVar
 
 import httpx
+from typing_extensions import Self
 
-from lineloom import calls, config_calls, event_stream, export_calls
-from lineloom.calls import Box, Call, Encoding, MapOptions
+from lineloom import calls
+from lineloom.async_following import follow
+from lineloom.async_queries import AsyncQueries
+from lineloom.calls import Call, Encoding, Name
 from lineloom.errors import ConnectionFailedError
 from lineloom.retry import RetryPolicy
 from lineloom.scan_like import ScanLike, batches
 from lineloom.session import DEFAULT_BATCH, BatchTotal, Session, not_idle, not_ready
 from lineloom.wire import (
     AnyEvent,
-    Constraint,
-    ConstraintDetail,
-    ConstraintPage,
-    Export,
-    ExportList,
-    FloorPlanAnswer,
-    Graph,
     IngestAnswer,
-    LocalizeAnswer,
-    MapAnswer,
-    MapFormat,
-    MapFrame,
-    MatchAnswer,
-    MountSettings,
-    PlanDifferences,
-    Readiness,
-    RemadeEvent,
-    Robot,
-    RobotList,
     Scan,
     Site,
-    SiteConfig,
-    SiteList,
-    Trajectory,
-    Transform,
-    WhatIf,
 )
 
 _FIRST_POLL = 0.05
@@ -51,8 +31,8 @@ _SLOWEST_POLL = 1.0
 _T = TypeVar("_T")
 
 
-class AsyncClient:
-    """Lineloom over HTTP for asyncio; see `Client`, which has the same calls.
+class AsyncClient(AsyncQueries):
+    """Lineloom over HTTP, for asyncio.
 
     url: default LINELOOM_URL, else the embedded service on this machine. token: default
     LINELOOM_TOKEN. encoding: of scans. compress: gzip bodies; None = unless the service runs on
@@ -86,12 +66,12 @@ class AsyncClient:
 
     # Ingest
 
-    async def post_scan(self, site: str, robot: str, scan: ScanLike) -> IngestAnswer:
+    async def post_scan(self, site: Name, robot: Name, scan: ScanLike) -> IngestAnswer:
         """Send one scan; when this returns, the service has it on disk."""
         return await self.post_scans(site, robot, [scan])
 
     async def post_scans(
-        self, site: str, robot: str, scans: Iterable[ScanLike], *, batch: int = DEFAULT_BATCH
+        self, site: Name, robot: Name, scans: Iterable[ScanLike], *, batch: int = DEFAULT_BATCH
     ) -> IngestAnswer:
         """Send scans of one robot in order, in batches, and return the sum of the answers.
 
@@ -103,211 +83,8 @@ class AsyncClient:
             total.add(await self._post(site, robot, part), len(part))
         return total.answer
 
-    async def set_mount(self, site: str, robot: str, mount: MountSettings) -> Robot:
-        """Say how the lidar sits on the robot; holds for the scans that follow."""
-        return await self._send(calls.put_mount(site, robot, mount))
-
-    # Query
-
-    async def sites(self) -> SiteList:
-        """Return all sites."""
-        return await self._send(calls.sites())
-
-    async def site(self, site: str) -> Site:
-        """Return how a site is doing."""
-        return await self._send(calls.site(site))
-
-    async def robots(self, site: str) -> RobotList:
-        """Return the robots of a site."""
-        return await self._send(calls.robots(site))
-
-    async def robot(self, site: str, robot: str) -> Robot:
-        """Return one robot at its latest processed scan."""
-        return await self._send(calls.robot(site, robot))
-
-    async def trajectory(
-        self, site: str, robot: str, *, align: bool = False, frame: MapFrame = "map"
-    ) -> Trajectory:
-        """Return the pose of every processed scan; align and frame as of `map_file`."""
-        return await self._send(calls.trajectory(site, robot, align, frame))
-
-    async def trajectory_text(
-        self,
-        site: str,
-        robot: str,
-        format: Literal["tum", "csv"] = "tum",
-        *,
-        align: bool = False,
-        frame: MapFrame = "map",
-    ) -> str:
-        """Return the trajectory as text; align and frame as of `map_file`."""
-        return await self._send(calls.trajectory_text(site, robot, format, align, frame))
-
-    async def transform(self, site: str, robot_a: str, robot_b: str) -> Transform:
-        """Return T_a_b; raises ConflictError while the two are not connected."""
-        return await self._send(calls.transform(site, robot_a, robot_b))
-
-    async def map(
-        self,
-        site: str,
-        *,
-        component: str | None = None,
-        bbox: Box | None = None,
-        since: int | None = None,
-    ) -> MapAnswer:
-        """Return the fused line map; bbox = (min x, min y, max x, max y) in the map frame.
-
-        since: a version; the answer has only what changed after it, unless `full`.
-        """
-        return await self._send(calls.map_lines(site, component, bbox, since))
-
-    async def map_file(
-        self,
-        site: str,
-        format: MapFormat,
-        *,
-        component: str | None = None,
-        bbox: Box | None = None,
-        align: bool = False,
-        frame: MapFrame = "map",
-        resolution: float | None = None,
-    ) -> bytes:
-        """Return the map as a file of the format named.
-
-        align: turned so that walls run along the axes. frame: "plan" for the floor plan's
-        coordinates. resolution [m]: of nav2's cells.
-        """
-        options = MapOptions(component, bbox, align, frame, resolution)
-        return await self._send(calls.map_file(site, format, options))
-
-    async def export(
-        self, site: str, format: MapFormat, options: MapOptions | None = None
-    ) -> Export:
-        """Write the map as it is now into a file that stays, and return its address and hash."""
-        return await self._send(export_calls.post_export(site, format, options or MapOptions()))
-
-    async def exports(self, site: str) -> ExportList:
-        """Return the exports of a site, oldest first."""
-        return await self._send(export_calls.exports(site))
-
-    async def export_file(self, site: str, export: str) -> bytes:
-        """Return an export's bytes."""
-        return await self._send(export_calls.export_file(site, export))
-
-    async def delete_export(self, site: str, export: str) -> None:
-        """Remove an export."""
-        await self._send(export_calls.delete_export(site, export))
-
-    # Floor plan
-
-    async def config(self, site: str) -> SiteConfig:
-        """Return every parameter that a site's map is made with."""
-        return await self._send(config_calls.config(site))
-
-    async def set_config(self, site: str, parameters: Mapping[str, Any]) -> SiteConfig:
-        """Set a site's own parameters, nested by name, in place of those set before.
-
-        `effect` of the answer says what follows: mostly that the map is made anew.
-        """
-        return await self._send(config_calls.put_config(site, parameters))
-
-    async def config_difference(self, site: str) -> RemadeEvent:
-        """Return what changed when the map was last made anew."""
-        return await self._send(config_calls.difference(site))
-
-    async def put_floorplan(self, site: str, content: bytes, media_type: str) -> FloorPlanAnswer:
-        """Send the building's plan, and return where in it the map lies, or why that is open.
-
-        media_type: application/geo+json, image/vnd.dxf, or text/plain for `x1, y1, x2, y2` lines.
-        """
-        return await self._send(export_calls.put_floorplan(site, content, media_type))
-
-    async def floorplan(self, site: str) -> FloorPlanAnswer:
-        """Return where in the plan each component lies."""
-        return await self._send(export_calls.floorplan(site))
-
-    async def delete_floorplan(self, site: str) -> None:
-        """Forget the plan."""
-        await self._send(export_calls.delete_floorplan(site))
-
-    async def floorplan_differences(
-        self, site: str, component: str | None = None
-    ) -> PlanDifferences:
-        """Return walls of the plan that are missing, and walls that it does not have."""
-        return await self._send(export_calls.floorplan_differences(site, component))
-
-    async def floorplan_drawing(
-        self, site: str, format: Literal["svg", "png"] = "svg", component: str | None = None
-    ) -> bytes:
-        """Return the differences as a picture."""
-        return await self._send(export_calls.floorplan_drawing(site, component, format))
-
-    async def graph(self, site: str, *, align: bool = False, frame: MapFrame = "map") -> Graph:
-        """Return the pose graph; align and frame as of `map_file`."""
-        return await self._send(calls.graph(site, align, frame))
-
-    async def graph_g2o(self, site: str, *, align: bool = False, frame: MapFrame = "map") -> str:
-        """Return the pose graph as g2o text; align and frame as of `map_file`."""
-        return await self._send(calls.graph_g2o(site, align, frame))
-
-    async def constraint_page(
-        self,
-        site: str,
-        *,
-        kind: str | None = None,
-        state: str | None = None,
-        limit: int | None = None,
-        cursor: str | None = None,
-    ) -> ConstraintPage:
-        """Return one page of constraints."""
-        return await self._send(calls.constraints(site, kind, state, limit, cursor))
-
-    async def constraints(
-        self, site: str, *, kind: str | None = None, state: str | None = None
-    ) -> AsyncIterator[Constraint]:
-        """Yield every constraint, page by page."""
-        cursor: str | None = None
-        while True:
-            page = await self.constraint_page(site, kind=kind, state=state, cursor=cursor)
-            for constraint in page.constraints:
-                yield constraint
-            cursor = page.next_cursor
-            if cursor is None:
-                return
-
-    async def constraint(self, site: str, constraint: str) -> ConstraintDetail:
-        """Return a constraint with all of its evidence."""
-        return await self._send(calls.constraint(site, constraint))
-
-    async def constraint_svg(self, site: str, constraint: str) -> str:
-        """Return a drawing of a constraint's evidence."""
-        return await self._send(calls.constraint_svg(site, constraint))
-
-    async def retract(self, site: str, constraint: str) -> Constraint:
-        """Make the map as if a constraint had never been accepted; return what became of it."""
-        return await self._send(calls.act_on_constraint(site, constraint, "retract"))
-
-    async def restore(self, site: str, constraint: str) -> Constraint:
-        """Take a retraction back; return what became of the constraint."""
-        return await self._send(calls.act_on_constraint(site, constraint, "restore"))
-
-    async def what_if(self, site: str, constraint: str) -> WhatIf:
-        """Return what retracting a constraint, or restoring a retracted one, would do."""
-        return await self._send(calls.what_if(site, constraint))
-
-    async def match(self, reference: ScanLike, current: ScanLike) -> MatchAnswer:
-        """Return where `current` was taken, seen from `reference`; adds nothing to any map."""
-        return await self._send(calls.match(reference, current))
-
-    async def localize(self, site: str, scans: Sequence[ScanLike]) -> LocalizeAnswer:
-        """Return where the latest of a short run of one robot's scans was taken in a site's map.
-
-        Adds nothing to the map.
-        """
-        return await self._send(calls.localize(site, scans))
-
     def events(
-        self, site: str, *, last_event_id: str | None = None, until_now: bool = False
+        self, site: Name, *, last_event_id: str | None = None, until_now: bool = False
     ) -> AsyncIterator[AnyEvent]:
         """Yield what happens to a site from now on, or after the event `last_event_id`.
 
@@ -315,13 +92,9 @@ class AsyncClient:
         `reset` event says where that was not possible. Ends with what there is so far where
         `until_now`; else raises once the site is gone or the service stays away.
         """
-        return event_stream.afollow(self._http, self.session, site, last_event_id, until_now)
+        return follow(self._http, self.session, site, last_event_id, until_now)
 
     # Wait
-
-    async def ready(self) -> Readiness:
-        """Return whether scans are taken and mapped; never tried again."""
-        return await self._send(calls.ready())
 
     async def wait_until_ready(self, timeout: float = 60.0, *, maps: bool = False) -> None:
         """Wait until scans are taken, and mapped at once where `maps`, or raise NotIdleError."""
@@ -340,7 +113,7 @@ class AsyncClient:
 
     async def wait_until_idle(
         self,
-        site: str,
+        site: Name,
         timeout: float = 600.0,
         *,
         on_poll: Callable[[Site], object] | None = None,
@@ -364,7 +137,7 @@ class AsyncClient:
             await asyncio.sleep(min(pause, left))
             pause = min(1.5 * pause, _SLOWEST_POLL)
 
-    async def _post(self, site: str, robot: str, part: Sequence[Scan]) -> IngestAnswer:
+    async def _post(self, site: Name, robot: Name, part: Sequence[Scan]) -> IngestAnswer:
         call = calls.post_scans(
             site,
             robot,

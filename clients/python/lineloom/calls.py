@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import gzip
+import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from http import HTTPStatus
@@ -26,6 +27,8 @@ from lineloom.wire import (
     ConstraintPage,
     Graph,
     IngestAnswer,
+    JoinRequest,
+    JoinTrial,
     LocalizeAnswer,
     LocalizeRequest,
     MapAnswer,
@@ -51,6 +54,8 @@ from lineloom.wire import (
 
 Encoding = Literal["json", "msgpack"]
 Box = tuple[float, float, float, float]
+Name = str | int
+"""Of a site or a robot; a number is its digits."""
 
 _COMPRESS_FROM_BYTES = 1024
 _T = TypeVar("_T")
@@ -82,7 +87,7 @@ class Call(Generic[_T]):
 
 
 def post_scans(
-    site: str, robot: str, scans: Sequence[Scan], *, encoding: Encoding, compress: bool
+    site: Name, robot: Name, scans: Sequence[Scan], *, encoding: Encoding, compress: bool
 ) -> Call[IngestAnswer]:
     """POST one batch."""
     body = pack_json(scans) if encoding == "json" else pack_msgpack(scans)
@@ -95,7 +100,7 @@ def post_scans(
     return Call("POST", path, read_model(IngestAnswer), headers=headers, content=body)
 
 
-def put_mount(site: str, robot: str, mount: MountSettings) -> Call[Robot]:
+def put_mount(site: Name, robot: Name, mount: MountSettings) -> Call[Robot]:
     """PUT the laser's pose on the robot."""
     body = RobotSettings(mount=mount).model_dump_json().encode()
     return Call(
@@ -112,43 +117,53 @@ def sites() -> Call[SiteList]:
     return Call("GET", "/v1/sites", read_model(SiteList))
 
 
-def site(name: str) -> Call[Site]:
+def site(name: Name) -> Call[Site]:
     """GET how a site is doing."""
     return Call("GET", site_path(name), read_model(Site))
 
 
-def robots(site: str) -> Call[RobotList]:
+def robots(site: Name) -> Call[RobotList]:
     """GET the robots of a site."""
     return Call("GET", f"{site_path(site)}/robots", read_model(RobotList))
 
 
-def robot(site: str, name: str) -> Call[Robot]:
+def robot(site: Name, name: Name) -> Call[Robot]:
     """GET one robot."""
     return Call("GET", _robot(site, name), read_model(Robot))
 
 
-def trajectory(site: str, robot: str, align: bool, frame: MapFrame) -> Call[Trajectory]:
+def delete_robot(site: Name, robot: Name) -> Call[None]:
+    """DELETE a robot, its scans and what rests on them."""
+    return Call("DELETE", _robot(site, robot), read_nothing)
+
+
+def delete_site(site: Name) -> Call[None]:
+    """DELETE a site and all that was sent to it."""
+    return Call("DELETE", site_path(site), read_nothing)
+
+
+def trajectory(site: Name, robot: Name, align: bool, frame: MapFrame) -> Call[Trajectory]:
     """GET every processed scan's pose."""
     path, params = f"{_robot(site, robot)}/trajectory", _lying(align, frame)
     return Call("GET", path, read_model(Trajectory), params=params)
 
 
 def trajectory_text(
-    site: str, robot: str, format: Literal["tum", "csv"], align: bool, frame: MapFrame
+    site: Name, robot: Name, format: Literal["tum", "csv"], align: bool, frame: MapFrame
 ) -> Call[str]:
     """GET the trajectory as text."""
     params = {"format": format} | _lying(align, frame)
     return Call("GET", f"{_robot(site, robot)}/trajectory", _text, params=params)
 
 
-def transform(site: str, robot_a: str, robot_b: str) -> Call[Transform]:
+def transform(site: Name, robot_a: Name, robot_b: Name) -> Call[Transform]:
     """GET T_a_b."""
     path = f"{site_path(site)}/transforms/{url_name(robot_a)}/{url_name(robot_b)}"
     return Call("GET", path, read_model(Transform))
 
 
 def map_lines(
-    site: str, component: str | None, bbox: Box | None, since: int | None = None
+    site: Name, component: str | None, bbox: Box | None, since: int | None = None
 ) -> Call[MapAnswer]:
     """GET the fused line map, or what changed in it after a version."""
     params = _map_params("json", component, bbox)
@@ -157,7 +172,7 @@ def map_lines(
     return Call("GET", f"{site_path(site)}/map", read_model(MapAnswer), params=params)
 
 
-def map_file(site: str, format: MapFormat, options: MapOptions) -> Call[bytes]:
+def map_file(site: Name, format: MapFormat, options: MapOptions) -> Call[bytes]:
     """GET the map as a file."""
     params = _map_params(format, options.component, options.bbox)
     params |= _lying(options.align, options.frame)
@@ -166,20 +181,20 @@ def map_file(site: str, format: MapFormat, options: MapOptions) -> Call[bytes]:
     return Call("GET", f"{site_path(site)}/map", read_bytes, params=params)
 
 
-def graph(site: str, align: bool, frame: MapFrame) -> Call[Graph]:
+def graph(site: Name, align: bool, frame: MapFrame) -> Call[Graph]:
     """GET the pose graph."""
     params = _lying(align, frame)
     return Call("GET", f"{site_path(site)}/graph", read_model(Graph), params=params)
 
 
-def graph_g2o(site: str, align: bool, frame: MapFrame) -> Call[str]:
+def graph_g2o(site: Name, align: bool, frame: MapFrame) -> Call[str]:
     """GET the pose graph as g2o text."""
     params = {"format": "g2o"} | _lying(align, frame)
     return Call("GET", f"{site_path(site)}/graph", _text, params=params)
 
 
 def constraints(
-    site: str, kind: str | None, state: str | None, limit: int | None, cursor: str | None
+    site: Name, kind: str | None, state: str | None, limit: int | None, cursor: str | None
 ) -> Call[ConstraintPage]:
     """GET a page of constraints."""
     wanted = {"kind": kind, "state": state, "limit": limit, "cursor": cursor}
@@ -187,33 +202,48 @@ def constraints(
     return Call("GET", f"{site_path(site)}/constraints", read_model(ConstraintPage), params=params)
 
 
-def events(site: str, follow: bool) -> Call[None]:
+def events(site: Name, follow: bool) -> Call[None]:
     """GET the stream of a site's events; `event_stream` reads it."""
     headers = {"Accept": "text/event-stream", "Cache-Control": "no-store"}
     params = {} if follow else {"follow": "false"}
     return Call("GET", f"{site_path(site)}/events", lambda _: None, params=params, headers=headers)
 
 
-def constraint(site: str, constraint_id: str) -> Call[ConstraintDetail]:
+def constraint(site: Name, constraint_id: str) -> Call[ConstraintDetail]:
     """GET one constraint with its evidence."""
     return Call("GET", _constraint(site, constraint_id), read_model(ConstraintDetail))
 
 
-def constraint_svg(site: str, constraint_id: str) -> Call[str]:
+def constraint_svg(site: Name, constraint_id: str) -> Call[str]:
     """GET a drawing of a constraint's evidence."""
     return Call("GET", _constraint(site, constraint_id), _text, params={"format": "svg"})
 
 
 def act_on_constraint(
-    site: str, constraint_id: str, action: Literal["retract", "restore"]
+    site: Name, constraint_id: str, action: Literal["retract", "restore", "confirm"]
 ) -> Call[Constraint]:
-    """POST that a constraint is to be retracted, or restored."""
+    """POST that a constraint is to be retracted, restored, or believed."""
     return Call("POST", f"{_constraint(site, constraint_id)}/{action}", read_model(Constraint))
 
 
-def what_if(site: str, constraint_id: str) -> Call[WhatIf]:
+def what_if(site: Name, constraint_id: str) -> Call[WhatIf]:
     """POST the question what retracting (or restoring) a constraint would do."""
     return Call("POST", f"{_constraint(site, constraint_id)}/what-if", read_model(WhatIf))
+
+
+def join(site: Name, request: JoinRequest) -> Call[Constraint]:
+    """POST that two places are the same."""
+    return _join(f"{site_path(site)}/constraints", request, Constraint)
+
+
+def try_join(site: Name, request: JoinRequest) -> Call[JoinTrial]:
+    """POST the question what a join would come to."""
+    return _join(f"{site_path(site)}/constraints/what-if", request, JoinTrial)
+
+
+def _join(path: str, request: JoinRequest, kind: type[_ModelT]) -> Call[_ModelT]:
+    body = request.model_dump_json(exclude_none=True).encode()
+    return Call("POST", path, read_model(kind), headers={"Content-Type": JSON}, content=body)
 
 
 def match(reference: ScanLike, current: ScanLike) -> Call[MatchAnswer]:
@@ -226,9 +256,10 @@ def match(reference: ScanLike, current: ScanLike) -> Call[MatchAnswer]:
     return Call("POST", "/v1/match", read_model(MatchAnswer), headers=headers, content=body)
 
 
-def localize(site: str, scans: Sequence[ScanLike]) -> Call[LocalizeAnswer]:
-    """POST a run of one robot's scans, to learn where the latest was taken."""
-    request = LocalizeRequest.model_construct(scans=[to_match_scan(scan) for scan in scans])
+def localize(site: Name, scans: ScanLike | Sequence[ScanLike]) -> Call[LocalizeAnswer]:
+    """POST a scan, or a run of one robot's scans, to learn where the latest was taken."""
+    run = scans if isinstance(scans, Sequence) else [scans]
+    request = LocalizeRequest.model_construct(scans=[to_match_scan(scan) for scan in run])
     return Call(
         "POST",
         f"{site_path(site)}/localize",
@@ -327,19 +358,19 @@ def _map_params(format: str, component: str | None, bbox: Box | None) -> dict[st
     return params
 
 
-def site_path(name: str) -> str:
+def site_path(name: Name) -> str:
     """Return the path of a site."""
     return f"/v1/sites/{url_name(name)}"
 
 
-def _constraint(site: str, constraint_id: str) -> str:
+def _constraint(site: Name, constraint_id: str) -> str:
     return f"{site_path(site)}/constraints/{url_name(constraint_id)}"
 
 
-def _robot(site: str, robot: str) -> str:
+def _robot(site: Name, robot: Name) -> str:
     return f"{site_path(site)}/robots/{url_name(robot)}"
 
 
-def url_name(name: str) -> str:
-    """Return a name as it stands in a path."""
-    return quote(name, safe="")
+def url_name(name: Name) -> str:
+    """Return a name as it stands in a path; raises TypeError for what is neither word nor int."""
+    return quote(name if isinstance(name, str) else str(operator.index(name)), safe="")

@@ -6,16 +6,16 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from lineloom.calls import Call, read_model, site_path
+from lineloom.calls import Call, Name, read_model, site_path
 from lineloom.wire import JSON, RemadeEvent, SiteConfig
 
 
-def config(site: str) -> Call[SiteConfig]:
+def config(site: Name) -> Call[SiteConfig]:
     """GET the parameters."""
     return Call("GET", f"{site_path(site)}/config", read_model(SiteConfig))
 
 
-def put_config(site: str, parameters: Mapping[str, Any]) -> Call[SiteConfig]:
+def put_config(site: Name, parameters: Mapping[str, Any]) -> Call[SiteConfig]:
     """PUT those that the site names itself."""
     return Call(
         "PUT",
@@ -26,6 +26,6 @@ def put_config(site: str, parameters: Mapping[str, Any]) -> Call[SiteConfig]:
     )
 
 
-def difference(site: str) -> Call[RemadeEvent]:
+def difference(site: Name) -> Call[RemadeEvent]:
     """GET what changed when the map was last made anew."""
     return Call("GET", f"{site_path(site)}/config/difference", read_model(RemadeEvent))

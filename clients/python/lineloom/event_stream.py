@@ -1,17 +1,13 @@
-"""Following a site's events, across lost connections and restarts of the service."""
+"""Where a listener to a site's events is, across lost connections and restarts of the service."""
 
 from __future__ import annotations
 
-import asyncio
-import time
-from collections.abc import AsyncIterator, Iterator
 from typing import Any
 
 import httpx
-from httpx_sse import EventSource, ServerSentEvent
+from httpx_sse import ServerSentEvent
 from pydantic import ValidationError
 
-from lineloom import calls
 from lineloom.calls import Call
 from lineloom.errors import ConnectionFailedError, ProblemError
 from lineloom.session import Session
@@ -24,53 +20,7 @@ Lost = httpx.TransportError | ProblemError | None
 """Why a connection ended: an error, or None where the service ended it in good order."""
 
 
-def follow(
-    http: httpx.Client, session: Session, site: str, last_event_id: str | None, until_now: bool
-) -> Iterator[AnyEvent]:
-    """Yield a site's events; see `Client.events`."""
-    course = _Course(session, calls.events(site, not until_now), last_event_id)
-    while True:
-        lost: Lost = None
-        try:
-            with http.stream(**course.request()) as response:
-                if not response.is_success:
-                    response.read()
-                calls.raise_for_problem(response)
-                for sent in EventSource(response).iter_sse():
-                    event = course.take(sent)
-                    if event is not None:
-                        yield event
-        except (httpx.TransportError, ProblemError) as error:
-            lost = error
-        if lost is None and until_now:
-            return
-        time.sleep(course.pause(lost))
-
-
-async def afollow(
-    http: httpx.AsyncClient, session: Session, site: str, last_event_id: str | None, until_now: bool
-) -> AsyncIterator[AnyEvent]:
-    """Yield a site's events; see `AsyncClient.events`."""
-    course = _Course(session, calls.events(site, not until_now), last_event_id)
-    while True:
-        lost: Lost = None
-        try:
-            async with http.stream(**course.request()) as response:
-                if not response.is_success:
-                    await response.aread()
-                calls.raise_for_problem(response)
-                async for sent in EventSource(response).aiter_sse():
-                    event = course.take(sent)
-                    if event is not None:
-                        yield event
-        except (httpx.TransportError, ProblemError) as error:
-            lost = error
-        if lost is None and until_now:
-            return
-        await asyncio.sleep(course.pause(lost))
-
-
-class _Course:
+class Course:
     """Where the listener is, and how often in a row it was not let in."""
 
     def __init__(self, session: Session, call: Call[None], last_event_id: str | None) -> None:

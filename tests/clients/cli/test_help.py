@@ -30,22 +30,32 @@ def examples(name: str) -> list[str]:
 def test_these_are_the_commands() -> None:
     assert NAMES == [
         "bench",
+        "bridge",
         "config",
+        "constraints",
         "db",
+        "delete",
         "demo",
         "doctor",
+        "events",
         "experiment",
         "export",
         "floorplan",
         "graph",
+        "join",
+        "localize",
         "map",
         "match",
+        "mount",
         "replay",
+        "robots",
         "serve",
         "simulate",
         "status",
         "token",
         "trajectory",
+        "transform",
+        "watch",
     ]
 
 
@@ -88,6 +98,10 @@ def test_every_query_has_output_for_scripts() -> None:
     queries += [ROOT.commands[n] for n in ("status", "doctor", "replay", "simulate", "demo")]
     for group, names in (("export", ("create", "list")), ("floorplan", ("put", "show"))):
         queries += [ROOT.commands[group].commands[n] for n in names]
+    queries += [
+        ROOT.commands[n] for n in ("join", "localize", "robots", "mount", "transform", "events")
+    ]
+    queries += ROOT.commands["constraints"].commands.values()
     queries.append(ROOT.commands["floorplan"].commands["differences"])
     for command in queries:
         assert any("--json" in p.opts for p in command.params), command.name

@@ -12,15 +12,22 @@ from lineloom.cli import (
     bench,
     bridge,
     config,
+    constraints,
+    dashboard,
     db,
+    delete,
     demo,
     doctor,
+    events,
     experiment,
     export,
     floorplan,
     graph,
+    join,
+    localize,
     match,
     replay,
+    robots,
     serve,
     simulate,
     status,
@@ -96,11 +103,20 @@ app.command("trajectory")(trajectory.trajectory)
 app.command("graph")(graph.graph)
 app.command("match")(match.match)
 app.command("bridge")(bridge.bridge)
+app.command("localize")(localize.localize)
 app.command("status")(status.status)
+app.command("watch")(dashboard.watch)
+app.command("events")(events.events)
+app.command("robots")(robots.robots)
+app.command("mount")(robots.mount)
+app.command("transform")(robots.transform)
+app.command("join")(join.join)
+app.command("delete")(delete.delete)
 app.command("doctor")(doctor.doctor)
 app.command("experiment")(experiment.experiment)
 app.add_typer(bench.app, name="bench")
 app.add_typer(config.app, name="config")
+app.add_typer(constraints.app, name="constraints")
 app.add_typer(db.app, name="db")
 app.add_typer(export.app, name="export")
 app.add_typer(floorplan.app, name="floorplan")

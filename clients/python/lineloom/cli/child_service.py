@@ -10,7 +10,8 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Self
+
+from typing_extensions import Self
 
 from lineloom.cli.failure import CommandError
 from lineloom.client import Client

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json as json_text
-import tomllib
+import sys
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,6 +15,11 @@ from lineloom.cli.failure import CommandError, Exit
 from lineloom.cli.patience import quick
 from lineloom.client import Client
 from lineloom.wire import SiteConfig
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 

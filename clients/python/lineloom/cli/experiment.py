@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,6 +11,7 @@ from lineloom.cli import options
 from lineloom.cli.console import note, out, print_json
 from lineloom.cli.failure import CommandError, Exit, needing_core
 from lineloom.cli.served_experiment import Service
+from lineloom.cli.word import Word
 
 if TYPE_CHECKING:
     from lineloom_lab.experiments import Experiment, Report, Settings
@@ -20,7 +20,7 @@ SHARED_DATA = Path(__file__).resolve().parents[5] / "shared" / "data"
 """Where real data lies beside a checkout: `../shared/data` from the project's root."""
 
 
-class MatcherChoice(StrEnum):
+class MatcherChoice(Word):
     """Who takes part."""
 
     DEFAULT = "default"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from datetime import UTC, datetime
+from datetime import datetime, timezone
 from typing import Annotated
 
 import typer
@@ -153,7 +153,7 @@ def delete(
 def _table(exports: list[Export]) -> Table:
     table = Table("id", "component", "version", "bytes", "created", box=None)
     for entry in exports:
-        created = datetime.fromtimestamp(entry.created, UTC).strftime("%Y-%m-%d %H:%M:%SZ")
+        created = datetime.fromtimestamp(entry.created, timezone.utc).strftime("%Y-%m-%d %H:%M:%SZ")
         table.add_row(
             entry.id, entry.component or "all", str(entry.version), str(entry.size), created
         )

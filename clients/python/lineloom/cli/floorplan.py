@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -14,6 +13,7 @@ from lineloom.cli.console import out, print_json
 from lineloom.cli.deliver import deliver, refuse_terminal
 from lineloom.cli.failure import CommandError, Exit
 from lineloom.cli.patience import quick
+from lineloom.cli.word import Word
 from lineloom.client import Client
 from lineloom.wire import FloorPlanAnswer
 
@@ -28,7 +28,7 @@ MEDIA_TYPES = {
 }
 
 
-class Format(StrEnum):
+class Format(Word):
     """What the service writes."""
 
     JSON = "json"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from typing import Annotated
 
 import typer
@@ -11,10 +10,11 @@ from lineloom.cli import options
 from lineloom.cli.deliver import deliver
 from lineloom.cli.map import Align, Frame, FrameOption
 from lineloom.cli.patience import quick
+from lineloom.cli.word import Word
 from lineloom.client import Client
 
 
-class Format(StrEnum):
+class Format(Word):
     """What the service writes."""
 
     JSON = "json"

@@ -2,35 +2,42 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
+from enum import Enum
 from typing import Annotated
 
 import typer
 
 from lineloom.calls import Box
 from lineloom.cli import options
+from lineloom.cli.complete import component_names
 from lineloom.cli.deliver import deliver, refuse_terminal
 from lineloom.cli.failure import CommandError, Exit
 from lineloom.cli.patience import quick
+from lineloom.cli.word import Word
 from lineloom.client import Client
 from lineloom.wire import MAP_FORMATS
 
 
-class Frame(StrEnum):
+class Frame(Word):
     """Coordinates."""
 
     MAP = "map"
     PLAN = "plan"
 
 
-Format = StrEnum("Format", list(MAP_FORMATS))  # type: ignore[misc]
+Format = Enum("Format", [(name, name) for name in MAP_FORMATS], type=str)  # type: ignore[misc]
 """What the service writes."""
 
 _SVG = Format("svg")
 
 FormatOption = Annotated[Format, typer.Option("--format", "-f", help="What kind of file to make.")]
 Component = Annotated[
-    str | None, typer.Option(metavar="ID", help="Only this component; else all of them.")
+    str | None,
+    typer.Option(
+        metavar="ID",
+        help="Only this component; else all of them.",
+        autocompletion=component_names,
+    ),
 ]
 BBox = Annotated[
     str | None,

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from lineloom.address import DEFAULT_URL, TOKEN_VARIABLE, URL_VARIABLE
+from lineloom.cli.complete import robot_names, site_names
 
 Url = Annotated[
     str | None,
@@ -24,9 +25,16 @@ Token = Annotated[
 Site = Annotated[
     str,
     typer.Option(
-        envvar="LINELOOM_SITE", metavar="NAME", help="The site: one floor of one building."
+        envvar="LINELOOM_SITE",
+        metavar="NAME",
+        help="The site: one floor of one building.",
+        autocompletion=site_names,
     ),
 ]
+Robot = Annotated[
+    str, typer.Argument(metavar="ROBOT", help="Which robot.", autocompletion=robot_names)
+]
+Yes = Annotated[bool, typer.Option("--yes", help="Do it without asking again.")]
 Json = Annotated[
     bool, typer.Option("--json", help="Print one JSON document on stdout, for scripts.")
 ]

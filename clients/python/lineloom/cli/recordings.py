@@ -165,5 +165,8 @@ def _session(path: Path) -> str:
 
 
 def _digest(path: Path) -> str:
+    digest = hashlib.blake2b()
     with path.open("rb") as content:
-        return hashlib.file_digest(content, "blake2b").hexdigest()[:12]
+        while block := content.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()[:12]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,13 +14,14 @@ from lineloom.cli.console import note
 from lineloom.cli.failure import CommandError, Exit
 from lineloom.cli.play import Stage, report
 from lineloom.cli.schedule import Due
+from lineloom.cli.word import Word
 from lineloom.scan_like import to_wire
 
 if TYPE_CHECKING:
     from lineloom_lab.simulation import Fleet, Lidar
 
 
-class LidarName(StrEnum):
+class LidarName(Word):
     """The lidars at hand."""
 
     SICK = "sick-lms200"

@@ -8,8 +8,10 @@ import typer
 from rich.table import Table
 
 from lineloom.cli import options
+from lineloom.cli.complete import site_names
 from lineloom.cli.console import out, print_json
 from lineloom.cli.patience import quick
+from lineloom.cli.robot_table import robot_table
 from lineloom.client import Client
 from lineloom.wire import Robot, Site
 
@@ -18,7 +20,10 @@ def status(
     site: Annotated[
         str | None,
         typer.Option(
-            envvar="LINELOOM_SITE", metavar="NAME", help="Show this site's robots; else all sites."
+            envvar="LINELOOM_SITE",
+            metavar="NAME",
+            help="Show this site's robots; else all sites.",
+            autocompletion=site_names,
         ),
     ] = None,
     url: options.Url = None,
@@ -79,16 +84,4 @@ def _show_site(site: Site, robots: list[Robot]) -> None:
     for kind, states in sorted(site.constraints.items()):
         counts = ", ".join(f"{count} {state}" for state, count in sorted(states.items()))
         out.print(f"{kind} constraints: {counts}", markup=False)
-    table = Table("robot", "component", "state", "x", "y", "theta", "scans", "health", box=None)
-    for robot in robots:
-        pose = robot.pose
-        where = ("", "", "") if pose is None else (f"{v:.2f}" for v in (pose.x, pose.y, pose.theta))
-        table.add_row(
-            robot.robot,
-            robot.component or "",
-            robot.state,
-            *where,
-            str(robot.scans.processed),
-            "; ".join(robot.health) or "well",
-        )
-    out.print(table)
+    out.print(robot_table(robots))
