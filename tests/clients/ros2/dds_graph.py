@@ -128,7 +128,7 @@ class Listener:
         return [t for t in all_of if t.header.frame_id == parent]
 
 
-def until(condition: Callable[[], Any], *turns: Callable[[], Any], within: float = 20.0) -> None:
+def until(condition: Callable[[], Any], *turns: Callable[[], Any], within: float = 90.0) -> None:
     """Turn everybody's crank until something holds."""
     deadline = time.monotonic() + within
     while not condition():

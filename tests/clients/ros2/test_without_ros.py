@@ -107,7 +107,7 @@ def test_a_robot_on_zenoh(fake: FakeService, loopback: str, tmp_path: Path, rout
     finally:
         robot.close()
         stopping.set()
-        work.join(20.0)
+        work.join(60.0)
     assert not work.is_alive()
 
 
@@ -140,12 +140,12 @@ def test_the_command_bridges_a_robot_on_dds_until_it_is_told_to_stop(
             drivers.odom_tf(at, Planar(1.0))
             drivers.wire.spin_once(0.05)
 
-        until(lambda: listener.transforms("map", "/r1/tf"), go, listener.take, within=40.0)
+        until(lambda: listener.transforms("map", "/r1/tf"), go, listener.take)
         found = listener.transforms("map", "/r1/tf")
         assert {t.child_frame_id for t in found} == {"odom"}
         assert site.scans()
         process.send_signal(signal.SIGTERM)
-        assert process.wait(20.0) == 0
+        assert process.wait(60.0) == 0
     finally:
         process.kill()
 
