@@ -12,11 +12,12 @@ from lineloom_core.kernels import kernel
 
 @kernel(nogil=True)
 def bulges(points, beams, lines, least_length, least_points, least_distance, steepest):  # type: ignore[no-untyped-def]
-    """Numerator and denominator [m^2] of the least-squares fit of epsilon to all walls (`bending`).
+    """Each wall's share in the least-squares fit of epsilon (`bending`): rows of numerator and
+    denominator [m^2].
 
     points (n, 2) of a scan, beams (n,) ascending, lines (m, 12).
     """
-    above, below = 0.0, 0.0
+    found, walls = np.empty((len(lines), 2)), 0
     n = len(points)
     along, shape, height = np.empty(n), np.empty(n), np.empty(n)
     for k in range(len(lines)):
@@ -37,9 +38,10 @@ def bulges(points, beams, lines, least_length, least_points, least_distance, ste
         if b - a < least_points or n < least_points:
             continue
         detrend(along[:n], shape[:n], height[:n])
-        above += (shape[:n] * height[:n]).sum()
-        below += (shape[:n] * shape[:n]).sum()
-    return above, below
+        found[walls, 0] = (shape[:n] * height[:n]).sum()
+        found[walls, 1] = (shape[:n] * shape[:n]).sum()
+        walls += 1
+    return found[:walls]
 
 
 @kernel(nogil=True)

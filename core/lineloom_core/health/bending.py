@@ -32,6 +32,7 @@ _LEAST_LEVERAGE_M2, _MOST_LEVERAGE_M2 = 0.02, 2.0
 _STEP_M, _STEP_RAD = 0.2, math.radians(6.0)
 _MEMORY = 400
 _LEAST_SCANS = 40.0
+_LEAST_TURNING, _LIKE_ONCE = 8.0, 0.35  # scans while turning, and how near to one turn a scan
 _STILL, _TURNING = 0.15, 0.35
 _LEAST_EPSILON = 0.03
 _LEAST_SKEW_S = 0.02
@@ -44,7 +45,11 @@ _LEAST_ROUND_M, _LEAST_ROUND_ARC, _ROUND_SHARE, _ROUND_SPREAD = 1.0, 0.5, 0.3, 0
 @storable("bending-check")
 @dataclass
 class BendingCheck:
-    """The last scans: rows epsilon, leverage [m^2], turn rate [rad/s]; radii of round walls [m]."""
+    """The last scans: rows epsilon, leverage [m^2], turn rate [rad/s]; radii of round walls [m].
+
+    sweep_s_per_rad: what a lidar that nobody times was found to take for its sweeps, counted
+    counter-clockwise; 0 where it was not.
+    """
 
     bends: deque[tuple[float, float, float]] = field(default_factory=lambda: deque(maxlen=_MEMORY))
     rounds: deque[float] = field(default_factory=lambda: deque(maxlen=_MEMORY))
@@ -52,6 +57,7 @@ class BendingCheck:
     since_rad: float = 0.0
     increment: float = 0.0
     is_timed: bool = False
+    sweep_s_per_rad: float = 0.0
 
     def examine(self, sample: Sample) -> None:
         """Measure the next scan once the robot has moved on."""
@@ -68,8 +74,40 @@ class BendingCheck:
         if bend is not None:
             self.bends.append((*bend, rate))
 
+    def time_the_beams(self, usual_s: float) -> None:
+        """Time the beams of a lidar that turns once from scan to scan, if walls bend as they would.
+
+        usual_s: from scan to scan [s]. Of what else bends walls nothing depends on the turn rate.
+        """
+        if self.is_timed or self.sweep_s_per_rad or usual_s <= 0.0 or self._is_round():
+            return
+        rows = np.array(self.bends).reshape(-1, 3)
+        weights = np.minimum(rows[:, 1], _MOST_LEVERAGE_M2)
+        still = np.abs(rows[:, 2]) < _STILL
+        epsilon = _robust(rows[still, 0], weights[still])
+        if epsilon.scans < _LEAST_TURNING:
+            return
+        once, both = usual_s / math.tau, []
+        for turning in (rows[:, 2] < -_TURNING, rows[:, 2] > _TURNING):
+            rates = rows[turning, 2]
+            both.append(
+                _robust((rows[turning, 0] - epsilon.value) / rates, weights[turning] * rates**2)
+            )
+        sign = math.copysign(1.0, both[0].value)
+        if all(
+            abs(sign * way.value - once) < _LIKE_ONCE * once
+            and way.scans >= 0.5 * _LEAST_TURNING
+            and way.stands_out(0.0)
+            for way in both
+        ):
+            self.sweep_s_per_rad = -sign * once
+
     def findings(self) -> list[Finding]:
         """What is wrong now."""
+        if self.sweep_s_per_rad:
+            return [
+                _skew(abs(self.sweep_s_per_rad), self.increment, "it is corrected by that; better ")
+            ]
         rows = np.array(self.bends).reshape(-1, 3)
         weights = np.minimum(rows[:, 1], _MOST_LEVERAGE_M2)
         still = np.abs(rows[:, 2]) < _STILL
@@ -141,11 +179,17 @@ def bend_of(features: ScanFeatures) -> tuple[float, float] | None:
     The variance of epsilon is that of the points across the walls over the leverage. None where no
     wall is seen long and wide enough to tell.
     """
-    above, below = kernels.bulges(
+    above, below = wall_bends(features).sum(axis=0).tolist()
+    return (above / below, below) if below >= _LEAST_LEVERAGE_M2 else None
+
+
+def wall_bends(features: ScanFeatures) -> NDArray[np.float64]:
+    """How each long wall is bent, shape (n, 2): epsilon times leverage, leverage [m^2]."""
+    bends: NDArray[np.float64] = kernels.bulges(
         features.points, features.beams, features.lines,
         _LEAST_LENGTH_M, _LEAST_POINTS, _LEAST_DISTANCE_M, _STEEPEST_RAD,
     )  # fmt: skip
-    return (above / below, below) if below >= _LEAST_LEVERAGE_M2 else None
+    return bends
 
 
 def _wrong_increment(epsilon: float, increment: float) -> Finding:
@@ -163,11 +207,12 @@ def _wrong_increment(epsilon: float, increment: float) -> Finding:
     )
 
 
-def _skew(seconds_per_rad: float, increment: float) -> Finding:
+def _skew(seconds_per_rad: float, increment: float, done: str = "") -> Finding:
     return Finding(
         "skew",
         "warning",
         f"scans are bent while the robot turns: a sweep takes {seconds_per_rad * math.tau:.2f} s "
-        "per turn and the robot turns meanwhile; send time_increment (about "
-        f"{1e6 * seconds_per_rad * abs(increment):.0f} microseconds) and it is corrected",
+        f"per turn and the robot turns meanwhile; {done}send time_increment (about "
+        f"{1e6 * seconds_per_rad * abs(increment):.0f} microseconds)"
+        + ("" if done else " and it is corrected"),
     )

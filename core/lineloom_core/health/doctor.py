@@ -94,8 +94,15 @@ class SensorDoctor:
         return _without(scan, false) if false.any() else scan
 
     def timed(self, scan: Scan) -> Scan:
-        """Return a scan, as it came, with its beams timed in seconds."""
-        return self.sweep.mended(scan)
+        """Return a scan, as it came, with its beams timed in seconds.
+
+        Where nobody times them, bent walls may have told: negative if the last beam is the first.
+        """
+        scan = self.sweep.mended(scan)
+        per_rad = self.bending.sweep_s_per_rad
+        if scan.time_increment or not per_rad:
+            return scan
+        return replace(scan, time_increment=per_rad * abs(scan.angle_increment))
 
     def examine(
         self, scan: Scan, features: ScanFeatures, pose: Pose | None, track: int | None
@@ -116,6 +123,7 @@ class SensorDoctor:
         sample = Sample(scan, features, step, rolled, elapsed, placed, began)
         for check in self._checks():
             check.examine(sample)
+        self.bending.time_the_beams(self.sweep.usual_s)
         self._pose, self._track = pose, track if placed else self._track
         self._odometry, self._stamp = scan.odometry, scan.stamp
 
@@ -168,7 +176,7 @@ def without_skew(scan: Scan, turn_rate: float, *, inverted: bool = False) -> Sca
     Turning at `turn_rate` [rad/s] during the sweep shifts beam i by i * time_increment * turn_rate:
     which is another increment, no more. Unchanged where the beams are not timed.
     """
-    if scan.time_increment <= 0.0 or turn_rate == 0.0:
+    if scan.time_increment == 0.0 or turn_rate == 0.0:
         return scan
     shift = turn_rate * scan.time_increment
     return replace(scan, angle_increment=scan.angle_increment + (-shift if inverted else shift))

@@ -35,7 +35,8 @@ def test_bulges_are_those_of_a_fit_wall_by_wall() -> None:
             shape = _straightened(bearing[flat] * x[flat], x[flat])
             above += float(shape @ _straightened(y[flat] + distance, x[flat]))
             below += float(shape @ shape)
-        found = kernels.bulges(features.points, features.beams, features.lines, 0.5, 10, 0.3, 1.3)
+        walls = kernels.bulges(features.points, features.beams, features.lines, 0.5, 10, 0.3, 1.3)
+        found = tuple(walls.sum(axis=0))
         assert below > 0.0
         assert found == pytest.approx((above, below), rel=1e-6, abs=1e-9)
 

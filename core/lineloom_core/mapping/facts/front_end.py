@@ -24,6 +24,8 @@ from lineloom_core.mapping.facts.information import step_information
 from lineloom_core.mapping.facts.keyframe import Keyframe, Step
 from lineloom_core.mapping.facts.placed_scans import PlacedScan
 from lineloom_core.mapping.facts.robot_record import RobotRecord
+from lineloom_core.mapping.facts.sweep_turn import turn_rate_of_sweep
+from lineloom_core.mapping.facts.thesis_tracker import ThesisTracker
 from lineloom_core.mapping.facts.tracker import Tracked
 from lineloom_core.mapping.facts.trackers import new_tracker
 from lineloom_core.matching.local_map import Cloud, LocalMap
@@ -55,7 +57,7 @@ def take(
         record.tracker = None  # restarted: it may have been carried anywhere
         record.sessions[scan.session] = None
         record.trust_again()
-    raw = _in_order(record, scan, is_late=is_late)
+    raw = _in_order(config, record, scan, is_late=is_late)
     scan = record.doctor.prepared(raw)
     features = extract_features(scan, config.extraction)
     cloud = Cloud.of(features)
@@ -73,7 +75,7 @@ def take(
     return _distrust(history, record, taken)
 
 
-def _in_order(record: RobotRecord, scan: Scan, *, is_late: bool) -> Scan:
+def _in_order(config: MapperConfig, record: RobotRecord, scan: Scan, *, is_late: bool) -> Scan:
     """Step 1: without the skew of turning, where beams are timed, and counter-clockwise.
 
     Ranges count to a micrometre: last bits depend on who computed them, and would tell where a
@@ -83,11 +85,22 @@ def _in_order(record: RobotRecord, scan: Scan, *, is_late: bool) -> Scan:
     ranges.setflags(write=False)  # as every scan's: kernels are compiled for either kind
     scan = replace(scan, ranges=ranges)
     inverted = record.mount.inverted
-    if record.tracker is not None and not is_late:
+    if not is_late:
         timed = record.doctor.timed(scan)
-        still = without_skew(timed, record.tracker.turn_rate, inverted=inverted)
+        rate = _turn_rate(config, record, timed)
+        still = without_skew(timed, rate, inverted=inverted)
         scan = replace(still, time_increment=scan.time_increment)  # for the doctor, as it came
     return scan.counter_clockwise(inverted=inverted)
+
+
+def _turn_rate(config: MapperConfig, record: RobotRecord, timed: Scan) -> float:
+    """How fast the robot turns during a sweep [rad/s]; 0 where beams are not timed."""
+    if not timed.time_increment:
+        return 0.0
+    tracker, inverted = record.tracker, record.mount.inverted
+    if isinstance(tracker, ThesisTracker):
+        return tracker.turn_rate
+    return turn_rate_of_sweep(tracker, timed, config.extraction, inverted=inverted)
 
 
 def _distrust(history: History, record: RobotRecord, taken: Taken) -> Taken:

@@ -85,6 +85,7 @@ class Expected:
     _steps=int,
     _driven=float,
     _turn_rate=float,
+    _last_rate=float,
 )
 class Motion:
     """The last steps of one track."""
@@ -100,6 +101,7 @@ class Motion:
         self._steps = 0
         self._driven = 0.0
         self._turn_rate = 0.0
+        self._last_rate = 0.0
 
     @property
     def turn_rate(self) -> float:
@@ -108,6 +110,11 @@ class Motion:
         Smoothed: a single step's is mostly noise, and would wind up the next sweep.
         """
         return self._turn_rate
+
+    @property
+    def last_rate(self) -> float:
+        """Turn rate over the last step alone [rad/s], 0 where it is not known."""
+        return self._last_rate
 
     @property
     def usual(self) -> tuple[float, float]:
@@ -176,6 +183,7 @@ class Motion:
         self._driven += math.hypot(step.x, step.y)
 
     def _turn(self, turn: float, elapsed: float) -> None:
+        self._last_rate = turn / elapsed if 0.01 < elapsed < 1.0 else 0.0
         if 0.01 < elapsed < 1.0:
             share = elapsed / (elapsed + _SMOOTHING_S)
             self._turn_rate += share * (turn / elapsed - self._turn_rate)

@@ -48,7 +48,7 @@ from lineloom_core.mapping.facts.recent import Recent
 from lineloom_core.mapping.facts.step_search import search_step, spotter_of
 from lineloom_core.mapping.facts.wheels import Wheels
 from lineloom_core.matching.free_space import judge_sweeps
-from lineloom_core.matching.local_map import Cloud, Registration
+from lineloom_core.matching.local_map import Cloud, LocalMap, Registration
 from lineloom_core.timing import timed
 
 _SETTLED = 0.12  # m: the gate with which a registration ends
@@ -128,6 +128,11 @@ class Tracker:
     def turn_rate(self) -> float:
         """Turn rate over the last few steps [rad/s], 0 where it is not known."""
         return self._motion.turn_rate
+
+    def surroundings(self, stamp: float) -> tuple[LocalMap, tuple[Pose, ...], float]:
+        """What was seen last, where a scan was likely taken, the last step's turn rate [rad/s]."""
+        motion = self._motion
+        return self._recent.map, motion.expect(stamp).predictions[:2], motion.last_rate
 
     @timed("track")
     def track(
