@@ -52,11 +52,18 @@ PLAYS = {"clients/python/docs/command-line.md"}
 """Pages that play recordings, to a site of their own."""
 SHORTER = {"simulate": ("--duration", "3")}
 """What is added to commands of the text, lest they take minutes."""
-GROUPS = ("lineloom config", "lineloom export", "lineloom floorplan", "lineloom token")
+GROUPS = (
+    "lineloom config",
+    "lineloom constraints",
+    "lineloom export",
+    "lineloom floorplan",
+    "lineloom token",
+)
 CODES = dict.fromkeys(GROUPS, 2)
 CODES |= {"lineloom replay": 2, "lineloom floorplan show": 4}
-"""What the commands of the text end with, if not 0: a group by itself shows its help, replay wants
-files, and the plan is another building's."""
+CODES |= {"lineloom localize": 2, "lineloom join r1 r2:120": 1}
+"""What the commands of the text end with, if not 0: a group by itself shows its help, replay and
+localize want files, the plan is another building's, and other robots are to be joined."""
 
 
 @dataclass(frozen=True)

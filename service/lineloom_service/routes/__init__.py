@@ -50,11 +50,16 @@ OPEN_ROUTERS: tuple[APIRouter, ...] = (status.router, docs.router, viewer.router
 
 
 def allowed_methods(path: str) -> list[str]:
-    """Return the methods that an address answers to: one route has one of them only."""
+    """Return the methods that an address answers to: one route has one of them only.
+
+    Where a path also reads as another's, with a name in it, it is the one with fewer names.
+    """
     routes = [route for router in (*ROUTERS, *OPEN_ROUTERS) for route in router.routes]
+    matching = [r for r in routes if isinstance(r, APIRoute) and r.path_regex.match(path)]
+    names = min((len(route.param_convertors) for route in matching), default=0)
     return sorted(
         method
-        for route in routes
-        if isinstance(route, APIRoute) and route.path_regex.match(path)
+        for route in matching
+        if len(route.param_convertors) == names
         for method in route.methods or ()
     )
