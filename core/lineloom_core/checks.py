@@ -16,6 +16,9 @@ from lineloom_core.join_odds import WEIGHTS
 NEAR_SLACK = 1.5
 """How far registration may go beyond the window that was searched, as a multiple of it."""
 
+_DUE, _AT_ONCE = 1.5, 2.0
+"""Surprise of a step that was due, and usual intervals that scans come within at once."""
+
 
 def _beyond_clutter(_: Any, threshold: float, figures: Figures) -> float:
     return threshold + figures["own_conflict"]
@@ -62,6 +65,12 @@ def _cost_of_step(_: Any, threshold: float, figures: Figures) -> float:
     return math.inf if near or figures.get("backed", 0.0) else threshold
 
 
+def _wall_of_step(_: Any, least: float, figures: Figures) -> float:
+    """Half of it is enough where somebody who drives evenly, unseen for no time, was due."""
+    due = figures.get("surprise", math.inf) < _DUE and figures.get("gap", 1.0) < _AT_ONCE
+    return 0.5 * least if due else least
+
+
 def _odds(name: str) -> Callable[[Figures], float]:
     return WEIGHTS[name].log_odds
 
@@ -99,7 +108,8 @@ TRACKED = Checks("A step from one keyframe to the next", "tracker", (
           adjusted=_cost_of_step,
           told="none up to a turn of 45 degrees, or where the pairwise matcher is sure of it",
           objection="that all it shows is new would be as likely"),
-    Check("wall", "Of what it fits", "m", at_least="least_wall",
+    Check("wall", "Of what it fits", "m", at_least="least_wall", adjusted=_wall_of_step,
+          told="half of it where even steps go on",
           objection="it shows too little wall to be known by"),
     Check("surprise", "Unlike the even steps before it", at_most="most_surprise",
           objection="no robot that drove evenly is there at once"),
