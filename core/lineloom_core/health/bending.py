@@ -104,7 +104,7 @@ class BendingCheck:
 
     def findings(self) -> list[Finding]:
         """What is wrong now."""
-        if self.sweep_s_per_rad:
+        if self.sweep_s_per_rad and not self.is_timed:
             return [
                 _skew(abs(self.sweep_s_per_rad), self.increment, "it is corrected by that; better ")
             ]
